@@ -1,0 +1,217 @@
+"""The generated C, compiled for the host, held against the numpy reference on a random but plausible track.
+
+The track is simulated from the spec's own model: each sensor at its own rate, with gaps, and with missing
+components where a sensor is `partial`. Both filters are given the same numbers, rounded to what the scalar
+type can carry, so that what differs is the filters' own arithmetic.
+
+* The error of x is in standard deviations of the reference, less the resolution of the numbers themselves (8
+  units in the last place of the largest |x_i| for floating point, 4 least significant bits for fixed point).
+* The error of P_ij is relative to sqrt(P_ii P_jj).
+* A decision at a threshold (a gate, a robust weight) may fall differently by round-off. Such a difference is
+  counted, and the compiled filter then goes on from the reference's estimate; more than 1 % of the calls, or
+  any error bit that only one of the two returns, fails the check.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kfgen.native.run import Plan, plan
+from kfgen.simulate import simulate
+from kfgen.spec.types import Spec
+from kfgen.status import ERROR, Status, describe
+
+if TYPE_CHECKING:
+    from kfgen.native.filter import NativeFilter
+    from kfgen.reference import ReferenceFilter
+
+Array = NDArray[np.float64]
+
+STEPS = 400
+SEED = 1
+GAPS = 0.05
+DIFFERENT_DECISIONS = 0.01
+TOLERANCES = {"float": 2e-3, "double": 1e-6}
+FIXED_TOLERANCE = 2e-2
+
+
+def tolerance_of(scalar: str) -> float:
+    """The largest error of x (in sigma) and P (relative) that passes."""
+    return TOLERANCES.get(scalar, FIXED_TOLERANCE)
+
+
+@dataclass
+class Worst:
+    """The largest error so far and where it was."""
+
+    error: float = 0.0
+    where: str = ""
+
+    def see(self, errors: Array, names: list[str], row: int) -> None:
+        """Take in errors [k] of the quantities `names`; NaN is the largest of all."""
+        errors = np.where(np.isnan(errors), np.inf, errors)
+        i = int(np.argmax(errors))
+        if errors[i] > self.error:
+            self.error, self.where = float(errors[i]), f"{names[i]}, step {row + 1}"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of a check; `differences` holds the calls whose status differs, as text."""
+
+    name: str
+    scalar: str
+    steps: int
+    calls: int
+    x: Worst
+    P: Worst
+    differences: tuple[str, ...]
+    errors_differ: bool
+    tolerance: float
+
+    @property
+    def passed(self) -> bool:
+        few = len(self.differences) <= DIFFERENT_DECISIONS * self.calls
+        return self.x.error <= self.tolerance >= self.P.error and few and not self.errors_differ
+
+    def text(self) -> str:
+        """The result in a few lines."""
+
+        def place(worst: Worst) -> str:
+            return f" ({worst.where})" if worst.where else ""
+
+        lines = [
+            f"{self.name} ({self.scalar}): {self.steps} steps, {self.calls} calls against the reference",
+            f"  x: error at most {self.x.error:.1e} sigma{place(self.x)}",
+            f"  P: error at most {self.P.error:.1e} of sqrt(P_ii P_jj){place(self.P)}",
+        ]
+        if self.differences:
+            lines.append(
+                f"  status: differs in {len(self.differences)} calls, first in {self.differences[0]}"
+            )
+        verdict = "passed" if self.passed else "FAILED"
+        return "\n".join([*lines, f"  tolerance {self.tolerance:.0e}: {verdict}"])
+
+
+def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
+    """Compile `spec` and compare it with the reference. KfgenError without a compiler; SpecError."""
+    from kfgen.native import compile as build
+    from kfgen.reference import reference
+
+    return compare(build(spec), reference(spec), steps, seed)
+
+
+def compare(kf: NativeFilter, ref: ReferenceFilter, steps: int = STEPS, seed: int = SEED) -> Outcome:
+    """Run both filters side by side over a simulated track of `steps` rows."""
+    spec = kf.spec
+    every = {sensor.name: 1 + i for i, sensor in enumerate(spec.measurements)}
+    work = _rounded(kf, plan(spec, simulate(spec, steps, seed, every, GAPS)))
+    random = np.random.default_rng(seed)
+    x, P = Worst(), Worst()
+    kf.init()
+    ref.init()
+    scales = _Scales(kf, ref)
+    differences: list[str] = []
+    calls, errors_differ = 0, False
+    for row in range(steps):
+        for call in _calls(spec, work, row, random):
+            ours, theirs = _made(kf, call), _made(ref, call)
+            calls += 1
+            if (ours ^ theirs) & ~Status.REGULARIZED:  # where a pivot is zero depends on the factorisation
+                text = f"{call[0]} of step {row + 1}: {describe(ours)}, reference {describe(theirs)}"
+                differences.append(text)
+                errors_differ |= ours >= ERROR or theirs >= ERROR
+                kf.set_state(ref.x)
+                kf.set_covariance(ref.P)
+        x.see(scales.x_errors(kf.x, ref.x, ref.P), scales.names, row)
+        P.see(scales.P_errors(kf.P, ref.P), scales.pairs, row)
+    return Outcome(
+        kf.name, spec.scalar, steps, calls, x, P, tuple(differences), errors_differ, tolerance_of(spec.scalar)
+    )
+
+
+# a function's name ("predict" or a sensor), and its keywords
+Call = tuple[str, dict[str, object]]
+
+
+def _made(kf: NativeFilter | ReferenceFilter, call: Call) -> int:
+    name, keywords = call
+    made: int = kf.predict(**keywords) if name == "predict" else kf.update(name, **keywords)  # type: ignore[arg-type]
+    return made
+
+
+def _calls(spec: Spec, work: Plan, row: int, random: np.random.Generator) -> list[Call]:
+    """The calls of one row in order."""
+    u = {"u": work.u[row]} if spec.inputs else {}
+    run_time = spec.dt is not None and spec.dt.run_time
+    calls: list[Call] = []
+    if work.step[row]:
+        calls.append(("predict", {**u, "dt": float(work.dt[row])} if run_time else {**u}))
+    first = 0
+    for i, sensor in enumerate(spec.measurements):
+        last = first + len(sensor.components)
+        if work.mask[row, i]:
+            keywords: dict[str, object] = {"z": work.z[row, first:last], **u}
+            if sensor.partial and random.random() < 0.2:
+                keywords["mask"] = int(random.integers(0, 1 << (last - first)))
+            calls.append((sensor.name, keywords))
+        first = last
+    return calls
+
+
+def _rounded(kf: NativeFilter, work: Plan) -> Plan:
+    """The same numbers as the scalar type carries them."""
+    scalar, units = kf._value, kf._units
+    z = np.concatenate([units.z[name] for name in kf.sensors]) if kf.sensors else np.empty(0)
+    return Plan(
+        work.t,
+        work.step,
+        scalar.to_physical(scalar.to_raw(work.dt, units.dt), units.dt),
+        scalar.to_physical(scalar.to_raw(work.u, units.u), units.u),
+        work.mask,
+        scalar.to_physical(scalar.to_raw(work.z, z), z),
+    )
+
+
+class _Scales:
+    """What errors are measured by; it learns magnitudes along the track."""
+
+    def __init__(self, kf: NativeFilter, ref: ReferenceFilter) -> None:
+        self.names = list(kf.states)
+        n = len(self.names)
+        self._upper = np.triu_indices(n)
+        self.pairs = [f"{self.names[i]}, {self.names[j]}" for i, j in zip(*self._upper, strict=True)]
+        self._periods = ref.model.periods
+        dtype = kf._value.dtype
+        floating = dtype.kind == "f"
+        self._relative = 8 * float(np.finfo(dtype).eps) if floating else 0.0
+        self._absolute = np.zeros(n) if floating else 4 * kf._units.x
+        self._magnitude = np.abs(ref.x)
+        self._variance = np.diag(ref.P).copy()
+
+    def x_errors(self, x: Array, truth: Array, P: Array) -> Array:
+        """Errors [n] in sigma; of a state that is known exactly, relative to its magnitude."""
+        self._magnitude = np.maximum(self._magnitude, np.abs(truth))
+        error = x - truth
+        for i, period in self._periods.items():
+            error[i] = math.remainder(error[i], period) if math.isfinite(error[i]) else math.inf
+        beyond = np.maximum(np.abs(error) - self._absolute - self._relative * self._magnitude, 0.0)
+        sigma = np.sqrt(np.maximum(np.diag(P), 0.0))
+        scale = np.where(sigma > 0, sigma, np.where(self._magnitude > 0, self._magnitude, 1.0))
+        errors: Array = beyond / scale
+        return errors
+
+    def P_errors(self, P: Array, truth: Array) -> Array:
+        """Errors of the upper triangle [n(n+1)/2], relative to the standard deviations."""
+        variance = np.diag(truth)
+        self._variance = np.maximum(self._variance, variance)
+        # a variance that has come down to round-off of what it was is as good as zero
+        floor = np.maximum(variance, np.maximum(self._relative, 1e-12) * self._variance)
+        scale = np.sqrt(np.outer(floor, floor))
+        errors: Array = (np.abs(P - truth) / np.where(scale > 0, scale, 1.0))[self._upper]
+        return errors

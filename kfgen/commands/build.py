@@ -1,0 +1,203 @@
+"""`kfgen build`: write the C files, or tell whether they are up to date."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from kfgen.commands.options import example, load_spec, scalar_option
+from kfgen.errors import KfgenError, Mistake, SpecError
+
+if TYPE_CHECKING:
+    from kfgen.generate import Generated
+    from kfgen.spec.types import Spec
+
+
+@dataclass(frozen=True)
+class Built:
+    """A spec, what was generated from it, and where its files belong."""
+
+    spec: Spec
+    generated: Generated
+    folder: Path
+
+    @property
+    def files(self) -> dict[Path, str]:
+        return {self.folder / name: text for name, text in self.generated.files.items()}
+
+
+@click.command(
+    short_help="Write the C files of specs, or check that they are up to date.",
+    epilog=example(
+        "kfgen build specs/vehicle.yaml",
+        "kfgen build specs/*.yaml -o src/filters",
+        "kfgen build --check specs/*.yaml",
+    ),
+)
+@click.argument("specs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SPEC...")
+@click.option(
+    "-o", "directory", type=click.Path(path_type=Path), default=Path("generated"), show_default=True,
+    metavar="DIR", help="Write to DIR/<name>/.",
+)  # fmt: skip
+@scalar_option
+@click.option(
+    "--check", "only_check", is_flag=True,
+    help="Write nothing; exit 1 with a unified diff when the files on disk are not what would be written.",
+)  # fmt: skip
+@click.option("--log", type=click.Path(path_type=Path), metavar="LOG", hidden=True)
+@click.option("--selftest", is_flag=True, hidden=True)
+@click.option("--layout", metavar="L", hidden=True)
+def build(
+    specs: Sequence[Path],
+    directory: Path,
+    scalar: str | None,
+    only_check: bool,
+    log: Path | None,
+    selftest: bool,
+    layout: str | None,
+) -> None:
+    """Write the C files of one or more specs to DIR/<name>/, and print what they take.
+
+    All specs are checked before anything is written.
+    """
+    for option, given in (("--log", log), ("--selftest", selftest), ("--layout", layout)):
+        if given:
+            raise KfgenError(f"build {option} is not built yet in this version")
+    built = generate_all(specs, directory, scalar)
+    _warn(built)
+    if only_check:
+        sys.exit(1 if report_differences(built) else 0)
+    from kfgen.files import write_all
+
+    write_all({path: text for each in built for path, text in each.files.items()})
+    click.echo(table(built))
+
+
+def generate_all(paths: Sequence[Path], directory: Path, scalar: str | None) -> list[Built]:
+    """Generate every spec; a SpecError holds the mistakes of all of them. KfgenError for two of one name."""
+    specs: list[Spec] = []
+    mistakes: list[Mistake] = []
+    for path in paths:
+        try:
+            specs.append(load_spec(path, scalar))
+        except SpecError as error:
+            mistakes += error.mistakes
+    if mistakes:
+        raise SpecError(mistakes)
+    places: dict[str, Path] = {}
+    for path, spec in zip(paths, specs, strict=True):
+        # folders that differ only in case are one on some file systems
+        other = places.setdefault(spec.name.lower(), path)
+        if other is not path:
+            raise KfgenError(
+                f"{other} and {path} are both named `{spec.name}`; their files would overwrite each other"
+            )
+    from kfgen.generate import build as generate
+
+    built = []
+    for spec in specs:
+        try:
+            built.append(Built(spec, generate(spec), directory / spec.name))
+        except SpecError as error:
+            mistakes += error.mistakes
+    if mistakes:
+        raise SpecError(mistakes)
+    return built
+
+
+def _warn(built: Sequence[Built]) -> None:
+    """What a spec may hold, but probably does not mean, on stderr."""
+    from kfgen.spec import warnings
+
+    for each in built:
+        for warning in warnings(each.spec):
+            click.echo(f"warning: {warning}", err=True)
+
+
+def report_differences(built: Sequence[Built]) -> int:
+    """Print a unified diff from the disk to what would be written; the number of files that differ."""
+    count = 0
+    for each in built:
+        for path, text in each.files.items():
+            try:
+                old = path.read_bytes().decode("utf-8", "replace")
+            except FileNotFoundError:
+                old = None
+            if old == text:
+                continue
+            count += 1
+            before = "/dev/null" if old is None else str(path)
+            # split at line feeds only: a carriage return on the disk is a difference, not a line end
+            lines = difflib.unified_diff(
+                _lines(old or ""), _lines(text), before, f"{path} (would be written)"
+            )
+            click.echo("".join(line if line.endswith("\n") else f"{line}\n" for line in lines), nl=False)
+    if count:
+        click.echo(
+            f"kfgen: {count} file{'s differ' if count > 1 else ' differs'}; run `kfgen build`", err=True
+        )
+    return count
+
+
+def _lines(text: str) -> list[str]:
+    return [f"{line}\n" for line in text.split("\n")[:-1]] + [line for line in text.split("\n")[-1:] if line]
+
+
+# --- the table
+
+
+def table(built: Sequence[Built]) -> str:
+    """Per filter its sizes, RAM and files, and the arithmetic of each function, in aligned columns."""
+    rows = [("filter", "size", "RAM", "function", "operations", "files")]
+    notes: list[str] = []
+    for each in built:
+        sizes, summary = _sizes(each.spec), each.generated.summary
+        functions = [(name, _operations(counts)) for name, counts in summary.rows]
+        files = [str(path) for path in each.files]
+        for i in range(max(len(sizes), len(functions), len(files))):
+            function, operations = functions[i] if i < len(functions) else ("", "")
+            rows.append(
+                (
+                    each.spec.name if i == 0 else each.spec.scalar if i == 1 else "",
+                    sizes[i] if i < len(sizes) else "",
+                    f"{summary.ram} B" if i == 0 else "",
+                    function,
+                    operations,
+                    files[i] if i < len(files) else "",
+                )
+            )
+        notes += [f"{each.spec.name}: {note}" for note in summary.notes]
+    return "\n".join([*aligned(rows, right=(2,)), *notes])
+
+
+def _sizes(spec: Spec) -> list[str]:
+    def plural(number: int, what: str) -> str:
+        return f"{number} {what}{'s' if number != 1 else ''}"
+
+    sizes = [plural(len(spec.states), "state")]
+    if spec.inputs:
+        sizes.append(plural(len(spec.inputs), "input"))
+    return [*sizes, *(f"{sensor.name}: {len(sensor.components)}" for sensor in spec.measurements)]
+
+
+def _operations(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{number} {operation}" for operation, number in counts.items() if number) or "none"
+
+
+def aligned(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> list[str]:
+    """Text rows as lines with aligned columns, the first row underlined; columns in `right` to the right."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    rule = ["-" * width for width in widths]
+    return [
+        "  ".join(
+            cell.rjust(width) if i in right else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in [rows[0], rule, *rows[1:]]
+    ]

@@ -1,0 +1,101 @@
+"""`kfgen run`: the compiled filter over a log."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from kfgen.commands.options import example, load_spec, scalar_option, spec_argument
+
+if TYPE_CHECKING:
+    from kfgen.native.run import RunResult
+    from kfgen.spec.types import Spec
+
+LONG = 200_000
+"""Rows from which a progress bar is worth its flicker."""
+
+
+@click.command(
+    short_help="Run the compiled filter over a log.",
+    epilog=example(
+        "kfgen run specs/vehicle.yaml drive.csv -o estimate.csv",
+        "kfgen run specs/vehicle.yaml drive.csv --plot estimate.png",
+    ),
+)
+@spec_argument
+@click.argument("log", type=click.Path(path_type=Path), metavar="LOG.csv")
+@click.option("-o", "out", type=click.Path(path_type=Path), metavar="OUT.csv", help="Where the estimates go.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the estimates.")
+@scalar_option
+def run(spec: Path, log: Path, out: Path | None, plot: Path | None, scalar: str | None) -> None:
+    """Run the compiled filter over a log with the columns t, <input>, <sensor>.<component>.
+
+    An empty cell is no measurement; a sensor with only some of its components is not updated, unless it is
+    `partial: true`. An empty input keeps its last value. Per row: predict, then the updates in the spec's
+    order. With a run-time dt, dt is t minus the last t, and there is no predict in the first row and for
+    equal t; with a fixed dt there is one predict per row.
+
+    The result has the columns t, x.<state>, var.<state>, nis.<sensor>, status, mu.<mode>. It goes to OUT.csv,
+    or to stdout if neither -o nor --plot is given.
+    """
+    from kfgen import logs, native
+
+    if plot is not None:
+        from kfgen.plot import require_matplotlib
+
+        require_matplotlib()
+    loaded = load_spec(spec, scalar)
+    data = logs.read(log, loaded)
+    if data.ignored:
+        click.echo(f"kfgen: ignored columns of {log}: {', '.join(data.ignored)}", err=True)
+    kf = native.compile(loaded)
+    with _progress(data.rows) as progress:
+        result = kf.run(data, progress)
+    _report(result)
+    if out is not None:
+        logs.write(out, columns(loaded, result))
+    elif plot is None:
+        logs.write_to(sys.stdout.buffer, columns(loaded, result))
+    if plot is not None:
+        from kfgen.plot import draw
+
+        draw(plot, loaded, data, result)
+
+
+def columns(spec: Spec, result: RunResult) -> dict[str, NDArray[np.generic]]:
+    """A run as columns of a CSV file; numbers keep the filter's own precision."""
+    own = np.float32 if spec.scalar == "float" else np.float64  # so that they print as short as they are
+    out: dict[str, NDArray[np.generic]] = {"t": result.t}
+    names = [state.name for state in spec.states]
+    out |= {f"x.{name}": result.x[:, i].astype(own) for i, name in enumerate(names)}
+    out |= {f"var.{name}": result.var[:, i].astype(own) for i, name in enumerate(names)}
+    out |= {f"nis.{name}": nis.astype(own) for name, nis in result.nis.items()}
+    out["status"] = result.status
+    if result.mu is not None and spec.imm is not None:
+        out |= {f"mu.{mode.name}": result.mu[:, i].astype(own) for i, mode in enumerate(spec.imm.modes)}
+    return out
+
+
+def _report(result: RunResult) -> None:
+    """What the filter refused, and what it warned of, on stderr."""
+    rows = len(result.t)
+    for errors, word in ((True, "error"), (False, "warning")):
+        for function, counts in result.counts(errors).items():
+            text = ", ".join(f"{flag.name} {number}x" for flag, number in counts.items())
+            click.echo(f"kfgen: {function}: {word} {text} in {rows} rows", err=True)
+
+
+@contextmanager
+def _progress(rows: int) -> Iterator[Callable[[int, int], None] | None]:
+    if rows < LONG or not sys.stderr.isatty():
+        yield None
+        return
+    with click.progressbar(length=rows, label="running", file=sys.stderr) as bar:
+        yield lambda done, _: bar.update(done - bar.pos)

@@ -1,0 +1,363 @@
+"""What the templates see: frozen data, already spelled in C. No algorithm, no option logic."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+
+import sympy
+
+from kfgen.emit.printer import WIDTH, Printer
+from kfgen.filters.base import Block, FilterCode
+from kfgen.ir.count import operations
+from kfgen.ir.program import Argument, Flag, Function, walk
+from kfgen.ir.schedule import LIBRARY_NAMES
+from kfgen.scalars import Scalar
+from kfgen.scalars.floating import slopes
+
+STATUSES = (
+    ("OK", 0x000, ""),
+    ("REGULARIZED", 0x001, "a variance was limited, or taken to zero by round-off"),
+    ("GLITCH_SMALL", 0x002, "an innovation was weighted down"),
+    ("GLITCH_LARGE", 0x004, "an innovation was cut off"),
+    ("ANOMALY", 0x008, "an innovation beyond its variance was taken all the same"),
+    ("GATED", 0x010, "the measurement was refused; nothing but nis has changed"),
+    ("SATURATED", 0x020, "a number was clipped to its range"),
+    ("DT_CLAMPED", 0x040, "dt was outside of its limits and was clamped"),
+    ("POINT_REJECTED", 0x080, "a sigma point was replaced"),
+    ("ERROR", 0x100, "errors from here up"),
+    ("NULL_ARGUMENT", 0x100, "a pointer is NULL"),
+    ("NOT_FINITE", 0x200, "an argument or a value of the model is NaN or infinite"),
+    ("NOT_POSITIVE", 0x400, "a variance or dt is not positive"),
+)
+
+
+@dataclass(frozen=True)
+class Named:
+    """A name with a comment, and whatever spelling belongs to it."""
+
+    name: str
+    comment: str = ""
+    value: str = ""
+    index_name: str = ""
+    type: str = ""
+    dimension: str = ""
+
+
+@dataclass(frozen=True)
+class SensorView:
+    name: str
+    NAME: str
+    components: tuple[Named, ...]
+
+
+@dataclass(frozen=True)
+class Data:
+    """A static const array, or a block of the header's comment."""
+
+    name: str = ""
+    title: str = ""
+    comment: str = ""
+    size: int = 0
+    values: str = ""
+    lines: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FunctionView:
+    doc: str
+    parameters: tuple[str, ...]
+    returns: tuple[str, ...]
+    costs: tuple[str, ...]
+    prototype: tuple[str, ...]
+    definition: tuple[str, ...]
+    opening: tuple[str, ...]
+    body: tuple[str, ...]
+    closing: str
+
+
+@dataclass(frozen=True)
+class ScalarView:
+    name: str
+    c_type: str
+    helpers: str
+    zero: str
+    one: str
+    ceil: str
+
+
+@dataclass(frozen=True)
+class View:
+    name: str
+    NAME: str
+    guard: str
+    command: str
+    title: str
+    description: tuple[str, ...]
+    filter: str
+    version: str
+    sympy: str
+    sha256: str
+    ram: int
+    scalar: ScalarView
+    states: tuple[Named, ...]
+    state_table: tuple[str, ...]
+    reference: tuple[Data, ...]
+    cost_table: tuple[str, ...]
+    advice: tuple[str, ...]
+    inputs: tuple[Named, ...]
+    sensors: tuple[SensorView, ...]
+    parameters: tuple[Named, ...]
+    fields: tuple[Named, ...]
+    statuses: tuple[Named, ...]
+    functions: tuple[FunctionView, ...]
+    constants: tuple[Data, ...]
+    tables: tuple[Data, ...]
+    helpers: tuple[str, ...]
+    uses_math: bool
+
+
+def package_version() -> str:
+    try:
+        return version("kfgen")
+    except PackageNotFoundError:
+        return "0"
+
+
+def make_view(code: FilterCode, scalar: Scalar, overridden: bool) -> View:
+    """The view of a filter; overridden: the scalar is not the spec's own."""
+    return _ViewMaker(code, scalar, overridden).make()
+
+
+class _ViewMaker:
+    def __init__(self, code: FilterCode, scalar: Scalar, overridden: bool) -> None:
+        self.code = code
+        self.scalar = scalar
+        self.overridden = overridden
+        self.spec = code.model.spec
+        self.name = self.spec.name
+        self.NAME = self.name.upper()
+        self.helpers: set[str] = set()
+        self.tables = {table: f"{self.name}_{label}" for table, label in code.tables.items()}
+
+    def make(self) -> View:
+        spec, code, scalar = self.spec, self.code, self.scalar
+        functions = tuple(self.function(f) for f in code.functions)
+        text = "\n".join(line for f in functions for line in f.body)
+        names = [s.name for s in spec.states]
+        return View(
+            name=self.name,
+            NAME=self.NAME,
+            guard=f"{self.NAME}_H",
+            command=f"{self.name}.yaml" + (f" --scalar {scalar.name}" if self.overridden else ""),
+            title=code.description if not spec.description else spec.description.strip().split("\n")[0],
+            description=tuple(spec.description.strip().split("\n")[1:]),
+            filter=code.description,
+            version=package_version(),
+            sympy=sympy.__version__,
+            sha256=spec.sha256,
+            ram=self.ram(),
+            scalar=ScalarView(
+                scalar.name, scalar.c_type, scalar.helpers, scalar.literal(scalar.nearest_integer(0)),
+                scalar.literal(scalar.nearest_integer(1)), scalar.function("ceil"),
+            ),
+            states=self.aligned([
+                Named(s.name, _about(s.unit, s.doc), index_name=f"{self.NAME}_{s.name.upper()}") for s in spec.states
+            ], "index_name", 1),
+            state_table=tuple(_columns([
+                [s.name, f"[{s.unit}]" if s.unit else "", {"real": "", "angle": "angle", "periodic": "periodic"}[s.kind],
+                 " ".join(s.doc.split())]
+                for s in spec.states
+            ])),
+            reference=tuple(self.reference(names)),
+            cost_table=tuple(_columns([[f.name, self.cost(f) or "loops"] for f in code.functions if self.counted(f)])),
+            advice=code.notes,
+            inputs=self.aligned([Named(i.name, _about(i.unit, i.doc)) for i in spec.inputs], "name", 1),
+            sensors=tuple(
+                SensorView(s.name, s.name.upper(), self.aligned(
+                    [Named(c.name, _about(c.unit, c.doc)) for c in s.components], "name", 1))
+                for s in spec.measurements
+            ),
+            parameters=self.aligned([Named(p.name, _about(p.unit, p.doc)) for p in spec.parameters], "name", 1),
+            fields=self.fields(),
+            statuses=tuple(
+                Named(name, f" /* {doc} */" if doc else "", value=f"0x{value:03x}u") for name, value, doc in STATUSES
+            ),
+            functions=functions,
+            constants=tuple(
+                Data(name=key, comment="inner position -> index into x", size=len(values),
+                     values="{ " + ", ".join(map(str, values)) + " }")
+                for key, values in code.constants.items()
+            ),
+            tables=tuple(self.table_data()),
+            helpers=tuple(sorted(self.helpers)),
+            uses_math=bool(self.helpers & {"wrap"}) or any(f"{f}(" in text for f in LIBRARY_NAMES),
+        )  # fmt: skip
+
+    # header ------------------------------------------------------------------------------------------
+
+    def aligned(self, rows: Sequence[Named], key: str, gap: int) -> tuple[Named, ...]:
+        """Comments in one column."""
+        width = max((len(getattr(r, key)) for r in rows), default=0)
+        last = rows[-1] if rows else None
+        out = []
+        for r in rows:
+            pad = " " * (width - len(getattr(r, key)) + gap + (1 if key == "index_name" and r is last else 0))
+            out.append(Named(r.name, f"{pad}/* {r.comment} */" if r.comment else "", index_name=r.index_name))
+        return tuple(out)
+
+    def fields(self) -> tuple[Named, ...]:
+        real = f"{self.name}_real_t"
+        types = {"real": real, "uint32": "uint32_t", "bool": "bool"}
+        rows: list[Named] = []
+        for block in self.code.blocks:
+            if block.name == "nis" and self.spec.parameters:
+                rows.append(Named("parameters", "may be changed while the filter runs", type=f"{self.name}_parameters_t"))
+            dimension = "" if block.size is None else f"[{block.size}]"
+            rows.append(Named(block.name, block.doc, type=types[block.kind], dimension=dimension))
+        width = max(len(r.type + r.name + r.dimension) for r in rows)
+        return tuple(
+            Named(r.name, " " * (width - len(r.type + r.name + r.dimension) + 1) + f"/* {r.comment} */",
+                  type=r.type, dimension=r.dimension)
+            for r in rows
+        )  # fmt: skip
+
+    def ram(self) -> int:
+        """sizeof of the struct, with natural alignment."""
+        size, align = 0, 1
+        blocks = list(self.code.blocks)
+        for block in [*blocks, *[Block(p.name, None, "") for p in self.spec.parameters]]:
+            each = {"real": self.scalar.size, "uint32": 4, "bool": 1}[block.kind]
+            size = -(-size // each) * each + each * (block.size or 1)
+            align = max(align, each)
+        return -(-size // align) * align
+
+    def reference(self, names: list[str]) -> list[Data]:
+        spec = self.spec
+        out = []
+        if self.code.order != tuple(range(len(names))):
+            inner = ", ".join(names[i] for i in self.code.order)
+            out.append(Data(title="order of the states inside U and D", lines=tuple(_fill(inner, 88))))
+        if spec.dt is None:
+            step = "the model knows no time"
+        elif self.code.model.dt is not None:
+            step = f"{spec.dt.nominal.text} s, compiled in"
+        else:
+            low, high = self.code.model.dt_limits
+            limits = [f"{word} {float(v):g} s" for word, v in (("at least", low), ("at most", high)) if v is not None]
+            step = "given at each step" + (f", clamped to {', '.join(limits)}" if limits else "")
+        out.append(Data(title=f"step: {step}"))
+        return out
+
+    def counted(self, function: Function) -> bool:
+        return function.name == "predict" or function.name.startswith("update_")
+
+    def cost(self, function: Function) -> str:
+        counts = operations(function.body)
+        if counts is None:
+            return ""
+        return ", ".join(f"{count} {op}" for op, count in counts.items()) or "none"
+
+    # functions ---------------------------------------------------------------------------------------
+
+    def index_name(self, path: str, index: int) -> str | None:
+        if path in ("kf.x", "x"):
+            return f"{self.NAME}_{self.spec.states[index].name.upper()}"
+        return None
+
+    def function(self, f: Function) -> FunctionView:
+        has_flags = any(isinstance(s, Flag) for s in walk(f.body))
+        printer = Printer(self.name, self.scalar, self.index_name, self.tables, has_flags)
+        body = printer.statements(f.body)
+        self.helpers |= printer.helpers
+        void = f.returns == "void"
+        head = f"{'void' if void else self.name + '_status_t'} {self.name}_{f.name}("
+        arguments = [self.argument(a) for a in f.arguments]
+        pointers = [a.name for a in f.arguments if a.pointer]
+        test = " || ".join(f"{p} == NULL" for p in pointers)
+        leave = "return;" if void else f"return {self.NAME}_NULL_ARGUMENT;"
+        opening = [f"if ({test}) {{ {leave} }}"]
+        if has_flags:
+            opening.append(f"{self.name}_status_t flags = {self.NAME}_OK;")
+        if body and body[0].lstrip().startswith("/*"):
+            opening.append("")
+        prototype = _signature(head, arguments)
+        docs = {"u": ", ".join(_with_unit(i.name, i.unit) for i in self.spec.inputs)}
+        sensor = f.name.removeprefix("update_")
+        for s in self.spec.measurements:
+            if s.name == sensor:
+                docs["z"] = ", ".join(_with_unit(c.name, c.unit) for c in s.components)
+        parameters = []
+        width = max(len(a.name) for a in f.arguments)
+        for a in f.arguments:
+            lines = _fill(docs.get(a.name, a.doc), WIDTH - 14 - width)
+            parameters.append(f"@param {a.name:<{width}}  {lines[0]}")
+            parameters += [" " * (9 + width) + line for line in lines[1:]]
+        returns = () if void else (f"@return {self.outcome(f)}",)
+        cost = self.cost(f) if self.counted(f) else ""
+        return FunctionView(
+            doc=f.doc,
+            parameters=tuple(parameters),
+            returns=returns,
+            costs=tuple(_fill(cost + ".", WIDTH - 6)) if cost else (),
+            prototype=tuple([*prototype[:-1], prototype[-1] + ";"]),
+            definition=tuple(prototype),
+            opening=tuple(line.rstrip() for line in opening),
+            body=tuple(body),
+            closing="" if void else "return flags;" if has_flags else f"return {self.NAME}_OK;",
+        )
+
+    def outcome(self, f: Function) -> str:
+        flags = sorted({s.flag for s in walk(f.body) if isinstance(s, Flag)})
+        text = f"{self.NAME}_OK" + "".join(f", {self.NAME}_{flag}" for flag in flags)
+        return f"{text}, or an error that leaves *kf as it was" if f.name != "init" else f"{text}, or {self.NAME}_NULL_ARGUMENT"
+
+    def argument(self, a: Argument) -> str:
+        kind = a.type.format(name=self.name)
+        const = "const " if a.constant and a.pointer else ""
+        if a.size is not None:
+            return f"{const}{kind} {a.name}[{a.size}]"
+        return f"{const}{kind} *{a.name}" if a.pointer else f"{kind} {a.name}"
+
+    def table_data(self) -> list[Data]:
+        out = []
+        for table, name in self.tables.items():
+            for suffix, values in (("x", table.x), ("y", table.y), ("slope", tuple(slopes(table)))):
+                text = ", ".join(self.scalar.literal(v) for v in values)
+                out.append(Data(name=f"{name}_{suffix}", size=len(values), lines=tuple(_fill(text, WIDTH - 6))))
+        return out
+
+
+def _signature(head: str, arguments: list[str]) -> list[str]:
+    line = head + ", ".join(arguments) + ")"
+    if len(line) <= WIDTH - 1:
+        return [line]
+    pad = " " * len(head)
+    out = [head + arguments[0] + ","]
+    out += [pad + a + "," for a in arguments[1:-1]]
+    return [*out, pad + arguments[-1] + ")"]
+
+
+def _about(unit: str, doc: str) -> str:
+    return " ".join(part for part in (f"[{unit}]" if unit else "", " ".join(doc.split())) if part)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _fill(text: str, width: int) -> list[str]:
+    lines = [""]
+    for word in text.split():
+        if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    return lines
+
+
+def _columns(rows: list[list[str]]) -> list[str]:
+    if not rows:
+        return []
+    widths = [max(len(row[c]) for row in rows) for c in range(len(rows[0]))]
+    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True) if w).rstrip() for row in rows]

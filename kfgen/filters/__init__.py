@@ -1,0 +1,1 @@
+"""The filters: algorithms written as in the book, traced into programs."""

@@ -1,0 +1,46 @@
+"""What a filter hands to the emitter: its storage and its functions. Everything emitted derives from these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from kfgen.ir.nodes import Table
+from kfgen.ir.program import Argument, Function
+from kfgen.model import Model
+
+
+@dataclass(frozen=True)
+class Block:
+    """A field of the filter's struct: `size` numbers (None: a single one)."""
+
+    name: str
+    size: int | None
+    doc: str
+    kind: str = "real"  # real | uint32 | bool
+    initial: tuple[Fraction, ...] = ()
+
+
+@dataclass(frozen=True)
+class FilterCode:
+    """A filter ready to print."""
+
+    model: Model
+    blocks: tuple[Block, ...]
+    functions: tuple[Function, ...]
+    order: tuple[int, ...]  # inner position -> state of the spec
+    description: str  # "EKF, U D U^T covariance, Bierman update"
+    notes: tuple[str, ...] = ()
+    constants: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  # static const tables of indices
+    tables: Mapping[Table, str] = field(default_factory=dict)
+
+
+KF = Argument("kf", "{name}_t", pointer=True, constant=False, doc="filter")
+CONST_KF = Argument("kf", "{name}_t", pointer=True, doc="filter")
+INPUTS = Argument("u", "{name}_inputs_t", pointer=True)
+DT = Argument("dt", "{name}_real_t", pointer=False, doc="time step [s]")
+
+
+def sensor_argument(sensor: str) -> Argument:
+    return Argument("z", "{name}_" + sensor + "_t", pointer=True, doc="measurement")

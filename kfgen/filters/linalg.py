@@ -1,0 +1,228 @@
+"""Factored linear algebra, written once for any number-like type (see `numbers`).
+
+P = U D U^T, U unit upper triangular. A matrix is a list of rows; of U only the entries above the diagonal
+are looked at. Every function is exact in real arithmetic; what is structurally zero is not computed.
+"""
+
+from __future__ import annotations
+
+from kfgen.filters.numbers import (
+    Number, assume_nonnegative, assume_positive, is_one, is_positive, is_zero, select,
+)  # fmt: skip
+
+Vector = list[Number]
+Rows = list[list[Number]]
+
+
+def dot(a: Vector, b: Vector) -> Number:
+    """Sum of a_i b_i, without the terms that are zero."""
+    total: Number = 0
+    for x, y in zip(a, b, strict=True):
+        if not is_zero(x) and not is_zero(y):
+            product = y if is_one(x) else x if is_one(y) else x * y
+            total = product if is_zero(total) else total + product
+    return total
+
+
+def zeros(rows: int, columns: int) -> Rows:
+    return [[0] * columns for _ in range(rows)]
+
+
+def unit_columns(F: Rows, U: Rows, k: int) -> Vector:
+    """Column k of F U for U unit upper triangular. F: (n, n); returns (n,)."""
+    n = len(F)
+    out: Vector = []
+    for i in range(n):
+        column = [U[j][k] if j < k else 1 if j == k else 0 for j in range(n)]
+        out.append(dot(F[i], column))
+    return out
+
+
+def rank_one(U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]]) -> None:
+    """U D U^T += sum of d w w^T over the columns (w, d, own), in place (Agee & Turner 1972; Bierman 1977, V.3).
+
+    The columns take one pivot after another together, so that an element of U is fetched once for all of
+    them. `own` is the pivot where a column carries most weight (-1: none): there U <- t U + b w is used for
+    U + b (w - s U), which loses digits where D is far below d s^2.
+    """
+    W = [list(w) for w, _, _ in columns]
+    weights = [d for _, d, _ in columns]
+    for j in reversed(range(len(D))):
+        steps = []
+        for c, w in enumerate(W):
+            if not is_zero(weights[c]) and not is_zero(w[j]):
+                s, b, t, D[j] = _pivot(D[j], w[j], weights[c])
+                weights[c] = 0 if is_zero(t) else weights[c] if is_one(t) else weights[c] * t
+                steps.append((w, s, b, t, columns[c][2] == j))
+        for i in range(j):
+            for w, s, b, t, own in steps:
+                U[i][j], w[i] = _element(U[i][j], w[i], s, b, t, own)
+
+
+def _pivot(D: Number, s: Number, d: Number) -> tuple[Number, Number, Number, Number]:
+    """s, b, t and the new D of a pivot: b = d s / D', t = D / D', D' = D + d s^2."""
+    v = d if is_one(s) else d * s
+    fresh = is_zero(D)
+    a = v * s if fresh else D + s * v
+    if fresh and is_one(s):
+        return s, 1, 0, a  # whatever d is: a direction without variance takes any U
+    if is_positive(D) or is_positive(a):
+        assume_positive(a)
+        if fresh:
+            return s, 1 / s, 0, a
+        r = 1 / a
+        return s, v * r, D * r, a
+    # A zero pivot leaves the column to the pivots above. Two quotients, since 1/a may overflow where
+    # neither of them does.
+    assume_nonnegative(a)
+    some = a > 0
+    return s, select(some, v / a, 0), select(some, 0 if fresh else D / a, 1), a
+
+
+def _element(u: Number, w: Number, s: Number, b: Number, t: Number, own: bool) -> tuple[Number, Number]:
+    """The new U_ij and w_i at pivot j."""
+    if is_zero(w) and is_zero(u):
+        return u, w
+    if is_zero(t):  # the pivot had no variance of its own: its column becomes w / s
+        return b * w, 0
+    if is_zero(u):
+        return b * w, w
+    if own:  # U first: w is then free to be overwritten
+        new = t * u if is_zero(w) else t * u + b * w
+        return new, (-(s * u) if is_zero(w) else w - s * u)
+    left = -(s * u) if is_zero(w) else w - s * u
+    return u + b * left, left
+
+
+def bierman(U: Rows, D: Vector, rows: Rows, variances: Vector) -> tuple[Rows, Vector]:
+    """Scalar measurement updates one after another, in place (Bierman 1977, V.2).
+
+    Normalised, so that k ends as the gain: U_ij -= f_j k_i, k_i += b U_ij, k_j = b. The measurements take one
+    column of U after another together. rows: h (m, n), variances: (m,). Returns the gains (m, n) and the
+    s = h P h^T + r (m,). A zero s gives a zero gain and changes nothing.
+    """
+    n = len(D)
+    K = [[0] * n for _ in rows]
+    s = list(variances)
+    for j in range(n):
+        column = [U[i][j] for i in range(j)]
+        steps: list[tuple[Vector, Number, Number]] = []
+
+        def element(i: int, column: Vector = column, steps: list[tuple[Vector, Number, Number]] = steps) -> Number:
+            """U_ij after the measurements so far."""
+            u = column[i]
+            for k, f, _ in steps:
+                u = u if is_zero(k[i]) else u - f * k[i]
+            return u
+
+        for c, h in enumerate(rows):
+            f = dot([element(i) if not is_zero(h[i]) else 0 for i in range(j)] + [1], h[: j + 1])
+            if is_zero(f) or is_zero(D[j]):
+                continue
+            b, D[j], s[c] = _gain(D[j], f, s[c])
+            steps.append((K[c], f, b))
+        for i in range(j):
+            u = column[i]
+            for k, f, b in steps:
+                if not is_zero(k[i]):
+                    u = u - f * k[i]
+                if not is_zero(u):
+                    k[i] = k[i] + b * u
+            U[i][j] = u
+        for k, _, b in steps:
+            k[j] = b
+    return K, s
+
+
+def _gain(D: Number, f: Number, before: Number) -> tuple[Number, Number, Number]:
+    """b, the new D and s of one column: s = before + f^2 D, b = D f / s, D' = D before / s."""
+    v = D if is_one(f) else D * f
+    s = before + f * v
+    if is_positive(before):
+        assume_positive(s)
+        inverse = 1 / s
+        return v * inverse, assume_nonnegative(D * (before * inverse)), s
+    assume_nonnegative(s)
+    some = s > 0
+    return select(some, v / s, 0), assume_nonnegative(D * select(some, before / s, 1)), s
+
+
+def gram_schmidt(rows: Rows, weights: Vector) -> tuple[Rows, Vector]:
+    """U, D with U D U^T = W diag(weights) W^T by modified weighted Gram-Schmidt (Thornton 1976; Bierman 1977, VI.4).
+
+    rows: W (n, m); weights (m,), none negative.
+    """
+    n = len(rows)
+    W = [list(row) for row in rows]
+    U = zeros(n, n)
+    D: Vector = [0] * n
+    for j in reversed(range(n)):
+        weighted = [x if is_zero(x) else x * d for x, d in zip(W[j], weights, strict=True)]
+        D[j] = assume_nonnegative(dot(weighted, W[j]))
+        for i in range(j):
+            product = dot(weighted, W[i])
+            if is_zero(product) or is_zero(D[j]):
+                continue
+            u = product / D[j] if is_positive(D[j]) else select(D[j] > 0, product / D[j], 0)
+            U[i][j] = u
+            W[i] = [a if is_zero(c) else a - u * c for a, c in zip(W[i], W[j], strict=True)]
+    return U, D
+
+
+def udu(P: Rows) -> tuple[Rows, Vector]:
+    """U, D of a symmetric positive semidefinite matrix; its upper triangle is read. A zero pivot gives a zero column."""
+    n = len(P)
+    P = [list(row) for row in P]
+    U = zeros(n, n)
+    D: Vector = [0] * n
+    for j in reversed(range(n)):
+        D[j] = P[j][j]
+        if is_zero(D[j]):
+            continue
+        for i in range(j):
+            if not is_zero(P[i][j]):
+                U[i][j] = P[i][j] / D[j] if is_positive(D[j]) else select(D[j] > 0, P[i][j] / D[j], 0)
+        for i in range(j):
+            for k in range(i + 1):
+                if not is_zero(U[i][j]) and not is_zero(P[k][j]):
+                    P[k][i] = P[k][i] - U[i][j] * P[k][j]
+    return U, D
+
+
+def quotients(c: Vector, s: Number, r: Number) -> Vector:
+    """c / s, and 0 where s is 0, for s = r + something not negative.
+
+    Where r is positive a shared reciprocal serves; where it may be zero 1/s can overflow and c/s cannot.
+    """
+    if is_positive(r):
+        inverse = 1 / s
+        return [x if is_zero(x) else x * inverse for x in c]
+    return [x if is_zero(x) else select(s > 0, x / s, 0) for x in c]
+
+
+def column(P: Rows, h: Vector) -> Vector:
+    """P h^T of a symmetric P, whose upper triangle is read."""
+    n = len(P)
+    return [dot([P[min(i, j)][max(i, j)] for j in range(n)], h) for i in range(n)]
+
+
+def triple(F: Rows, P: Rows) -> Rows:
+    """F P F^T of a symmetric P (upper triangle read), upper triangle computed. F: (m, n), P: (n, n).
+
+    The sparser of two rows is the outer factor, and rows of F P are made when they are first needed.
+    """
+    m = len(F)
+    weight = [sum(not is_zero(x) for x in row) for row in F]
+    rows: dict[int, Vector] = {}
+
+    def product(i: int) -> Vector:
+        if i not in rows:
+            rows[i] = column(P, F[i])
+        return rows[i]
+
+    out = zeros(m, m)
+    for i in range(m):
+        for j in range(i, m):
+            outer, inner = (i, j) if weight[i] < weight[j] else (j, i)
+            out[i][j] = dot(F[outer], product(inner))
+    return out

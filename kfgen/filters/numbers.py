@@ -1,0 +1,103 @@
+"""What linear algebra asks of its numbers, for traced Values and for Python numbers alike.
+
+Structural facts (this is zero, this is positive) are known of a traced number when its program is made;
+of a Python number they are simply looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+from kfgen.ir.nodes import Node
+from kfgen.ir.trace import Trace, Value
+
+Number = Any  # a Value, or a Python or numpy number
+
+
+def is_zero(a: Number) -> bool:
+    """Structurally zero."""
+    return bool(a.constant == 0) if isinstance(a, Value) else bool(a == 0)
+
+
+def is_one(a: Number) -> bool:
+    return bool(a.constant == 1) if isinstance(a, Value) else bool(a == 1)
+
+
+def select(condition: Any, a: Number, b: Number) -> Number:
+    """a where the condition holds, else b: a value, not a branch."""
+    if isinstance(condition, Value):
+        return condition.trace.select(condition, a, b)
+    return a if condition else b
+
+
+def sqrt(a: Number) -> Number:
+    if isinstance(a, Value):
+        return a.trace.function("sqrt", a)
+    return math.sqrt(a)
+
+
+def is_positive(a: Number) -> bool:
+    """Known to be above zero whatever the run brings."""
+    return _sign(a.trace, a.node) == 2 if isinstance(a, Value) else bool(a > 0)
+
+
+def is_nonnegative(a: Number) -> bool:
+    """Known not to be below zero."""
+    return _sign(a.trace, a.node) >= 1 if isinstance(a, Value) else bool(a >= 0)
+
+
+def assume_positive(a: Number) -> Number:
+    """Record that a guard or an invariant makes a positive."""
+    if isinstance(a, Value) and a.constant is None:
+        _facts(a.trace)[a.node] = 2
+    return a
+
+
+def assume_nonnegative(a: Number) -> Number:
+    if isinstance(a, Value) and a.constant is None:
+        _facts(a.trace).setdefault(a.node, 1)
+    return a
+
+
+def _facts(trace: Trace) -> dict[Node, int]:
+    return trace.__dict__.setdefault("signs", {})
+
+
+def _sign(trace: Trace, node: Node) -> int:
+    """2: positive, 1: not negative, 0: not known."""
+    facts = _facts(trace)
+    known = facts.get(node)
+    if known is None:
+        known = facts[node] = _derive(trace, node)
+    return known
+
+
+def _derive(trace: Trace, node: Node) -> int:
+    value = node.constant
+    if value is not None:
+        return 2 if value > 0 else 1 if value == Fraction(0) else 0
+    signs = [_sign(trace, a) for a in node.args if a.kind == "real"]
+    match node.op:
+        case "add":
+            return max(signs) if min(signs) >= 1 else 0
+        case "mul" if node.args[0] is node.args[1]:
+            return max(1, signs[0])
+        case "mul" if node.args[1].op == "mul" and node.args[0] in node.args[1].args:  # a (b a) = b a^2
+            other = [n for n in node.args[1].args if n is not node.args[0]] or [node.args[0]]
+            return min(1, _sign(trace, other[0]))
+        case "mul" | "div":
+            return min(signs)
+        case "sqrt":
+            return max(1, signs[0])
+        case "exp":
+            return 2
+        case "abs" | "hypot":
+            return 1
+        case "select" | "min":
+            return min(signs)
+        case "max":
+            return max(signs) if max(signs) == 2 else 1 if max(signs) else 0
+        case _:
+            return 0

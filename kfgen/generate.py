@@ -1,0 +1,65 @@
+"""Spec -> {file name: text}. Pure: the same bytes for the same spec, options and versions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from kfgen.emit.render import render
+from kfgen.emit.view import View, make_view
+from kfgen.errors import KfgenError
+from kfgen.filters.base import FilterCode
+from kfgen.filters.build import build_filter
+from kfgen.ir.count import operations
+from kfgen.ir.schedule import RESERVED
+from kfgen.scalars import SCALARS
+from kfgen.spec.types import Spec
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What the build table shows: operations per function, RAM in bytes, remarks."""
+
+    rows: list[tuple[str, dict[str, int]]]
+    ram: int
+    notes: list[str]
+
+
+@dataclass(frozen=True)
+class Generated:
+    """The files of a filter, what they cost, and the program they were printed from."""
+
+    files: dict[str, str]
+    summary: Summary
+    code: FilterCode
+    view: View
+
+
+def build(spec: Spec, scalar: str | None = None) -> Generated:
+    """Generate a spec's files. scalar overrides the spec's. Raises SpecError."""
+    overridden = scalar is not None and scalar != spec.scalar
+    if scalar is not None:
+        spec = replace(spec, scalar=scalar)
+    code = build_filter(spec, _epsilon(spec.scalar), RESERVED)
+    view = make_view(code, SCALARS[spec.scalar], overridden)
+    rows = []
+    for function in code.functions:
+        counts = operations(function.body)
+        if function.name == "predict" or function.name.startswith("update_"):
+            rows.append((function.name, counts or {}))
+    notes = [code.description]
+    if code.order != tuple(range(len(code.order))):
+        notes.append("inner order: " + " ".join(code.model.states[i] for i in code.order))
+    return Generated(render(view), Summary(rows, view.ram, notes), code, view)
+
+
+def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:
+    """File name -> text of a spec's C. Raises SpecError."""
+    return build(spec, scalar).files
+
+
+def _epsilon(scalar: str) -> object:
+    if scalar in SCALARS:
+        return SCALARS[scalar].epsilon
+    if scalar.startswith("q"):
+        return SCALARS["float"].epsilon  # refused later, by name
+    raise KfgenError(f"unknown scalar `{scalar}`; use float or double")

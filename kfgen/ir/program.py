@@ -1,0 +1,145 @@
+"""Statements and functions: the straight-line (and looped) program that is printed, run and counted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from kfgen.ir.nodes import Node
+
+
+@dataclass(slots=True)
+class Section:
+    """A comment that heads the statements after it."""
+
+    text: str
+
+
+@dataclass(slots=True)
+class Let:
+    """A constant local: name = node."""
+
+    node: Node
+    name: str
+
+
+@dataclass(slots=True)
+class Declare:
+    """A local array of reals, or (size None) a variable with its first value."""
+
+    name: str
+    size: int | None
+    value: Node | None = None
+    kind: str = "real"
+
+
+@dataclass(slots=True)
+class Assign:
+    """array[index] = node, or name = node where index is None."""
+
+    name: str
+    index: Node | None
+    node: Node
+
+
+@dataclass(slots=True)
+class Store:
+    """A field of the filter: kf->name[index] = node (index None: kf->name)."""
+
+    name: str
+    index: Node | None
+    node: Node
+
+
+@dataclass(slots=True)
+class Guard:
+    """Where the condition holds the function ends with this status and nothing has been changed.
+
+    before: stores that are made all the same (nis of a gated update). Status is a list of flag names.
+    """
+
+    condition: Node
+    status: str
+    before: list[Store] = field(default_factory=list)
+    why: str = ""
+
+
+@dataclass(slots=True)
+class Flag:
+    """Where the condition holds a warning is added to the status that the function returns."""
+
+    condition: Node
+    flag: str
+
+
+@dataclass(slots=True)
+class For:
+    """for (variable = start; variable < stop; variable++), or downwards from stop - 1 to start."""
+
+    variable: str
+    start: Node
+    stop: Node
+    body: list[Statement]
+    down: bool = False
+
+
+@dataclass(slots=True)
+class If:
+    """Runs the body where the condition holds; for actions in loops, never for values."""
+
+    condition: Node
+    body: list[Statement]
+
+
+Statement = Section | Let | Declare | Assign | Store | Guard | Flag | For | If
+
+
+@dataclass(slots=True)
+class Argument:
+    """An argument of a function: a struct or array behind a pointer, or a number."""
+
+    name: str
+    type: str
+    pointer: bool
+    constant: bool = True
+    doc: str = ""
+    size: int | None = None  # arrays: type name[size]
+
+
+@dataclass(slots=True)
+class Function:
+    """An emitted function: its body is scheduled (every shared value has its Let)."""
+
+    name: str
+    arguments: list[Argument]
+    body: list[Statement]
+    doc: str
+    returns: str = "status"  # status | void
+    notes: list[str] = field(default_factory=list)
+
+
+def roots(statement: Statement) -> list[Node]:
+    """The nodes that a statement itself evaluates (not those of its body)."""
+    match statement:
+        case Let(node=node):
+            return [node]
+        case Assign(index=index, node=node) | Store(index=index, node=node):
+            return [node] if index is None else [index, node]
+        case Declare(value=value):
+            return [] if value is None else [value]
+        case Guard(condition=condition, before=before):
+            return [condition] + [n for store in before for n in roots(store)]
+        case Flag(condition=condition) | If(condition=condition):
+            return [condition]
+        case For(start=start, stop=stop):
+            return [start, stop]
+        case Section():
+            return []
+
+
+def walk(body: list[Statement]) -> Iterator[Statement]:
+    """Every statement, those inside loops included."""
+    for statement in body:
+        yield statement
+        if isinstance(statement, For | If):
+            yield from walk(statement.body)

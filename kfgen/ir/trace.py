@@ -1,0 +1,265 @@
+"""Tracing: numbers that record what is done with them.
+
+An algorithm written for numbers runs on `Value`s and leaves a program behind. Structural zeros and ones
+fold as it runs, so the algorithm is written in full and what is emitted is what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from kfgen.ir.nodes import BOOL, INT, Node, Pool, Table
+from kfgen.ir.program import Assign, Declare, Flag, For, Guard, If, Section, Statement, Store
+
+Number = int | Fraction
+
+
+class Value:
+    """A number of the traced program: arithmetic and comparisons make further Values."""
+
+    __slots__ = ("node", "trace")
+
+    def __init__(self, trace: Trace, node: Node) -> None:
+        self.trace = trace
+        self.node = node
+
+    def _binary(self, operation: str, a: Value | Number, b: Value | Number) -> Value:
+        t = self.trace
+        kind = self.node.kind
+        return t.wrapped(getattr(t.pool, operation)(t.node(a, kind), t.node(b, kind)))
+
+    def __add__(self, other: Value | Number) -> Value:
+        return self._binary("add", self, other)
+
+    def __radd__(self, other: Number) -> Value:
+        return self._binary("add", other, self)
+
+    def __sub__(self, other: Value | Number) -> Value:
+        return self._binary("sub", self, other)
+
+    def __rsub__(self, other: Number) -> Value:
+        return self._binary("sub", other, self)
+
+    def __mul__(self, other: Value | Number) -> Value:
+        return self._binary("mul", self, other)
+
+    def __rmul__(self, other: Number) -> Value:
+        return self._binary("mul", other, self)
+
+    def __truediv__(self, other: Value | Number) -> Value:
+        return self._binary("div", self, other)
+
+    def __rtruediv__(self, other: Number) -> Value:
+        return self._binary("div", other, self)
+
+    def __neg__(self) -> Value:
+        return self.trace.wrapped(self.trace.pool.neg(self.node))
+
+    def __lt__(self, other: Value | Number) -> Value:
+        return self._binary("less", self, other)
+
+    def __le__(self, other: Value | Number) -> Value:
+        return self._binary("less_equal", self, other)
+
+    def __gt__(self, other: Value | Number) -> Value:
+        return self._binary("less", other, self)
+
+    def __ge__(self, other: Value | Number) -> Value:
+        return self._binary("less_equal", other, self)
+
+    def __and__(self, other: Value) -> Value:
+        return self._binary("both", self, other)
+
+    def __or__(self, other: Value) -> Value:
+        return self._binary("either", self, other)
+
+    def __invert__(self) -> Value:
+        return self.trace.wrapped(self.trace.pool.negate(self.node))
+
+    @property
+    def constant(self) -> Fraction | None:
+        return self.node.constant
+
+    def __repr__(self) -> str:
+        return f"Value({self.node!r})"
+
+
+@dataclass
+class Block:
+    """What was recorded in one scope: statements, and nodes where they were first made."""
+
+    items: list[Statement | Node] = field(default_factory=list)
+
+
+class Trace:
+    """The recording of one function."""
+
+    def __init__(self) -> None:
+        self.pool = _RecordingPool(self)
+        self.block = Block()
+        self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body
+        self.names: dict[Node, str] = {}
+        self.flags: list[tuple[Node, str]] = []
+        self.zero = self.wrapped(self.pool.zero)
+        self.one = self.wrapped(self.pool.one)
+
+    # values ----------------------------------------------------------------------------------------
+
+    def wrapped(self, node: Node) -> Value:
+        return Value(self, node)
+
+    def node(self, value: Value | Number, kind: str = "real") -> Node:
+        if isinstance(value, Value):
+            return value.node
+        return self.pool.integer(int(value)) if kind == INT else self.pool.constant(value)
+
+    def value(self, number: Value | Number) -> Value:
+        return self.wrapped(self.node(number))
+
+    def field(self, path: str) -> Value:
+        """A number that the function is given: `u.gyro`, `z.x`, `dt`, `kf.nis`."""
+        return self.wrapped(self.pool.make("field", (), path))
+
+    def element(self, path: str, index: int | Value) -> Value:
+        """An element of an array that the function is given: `kf.x`, `kf.U`, `P`."""
+        return self.wrapped(self.pool.make("element", (self.node(index, INT),), path))
+
+    def function(self, op: str, *args: Value | Number) -> Value:
+        return self.wrapped(self.pool.function(op, *[self.node(a) for a in args]))
+
+    def wrap(self, a: Value, period: Fraction) -> Value:
+        return self.wrapped(self.pool.wrap(a.node, period))
+
+    def table(self, a: Value, table: Table, slope: bool = False) -> Value:
+        return self.wrapped(self.pool.table(a.node, table, slope))
+
+    def select(self, condition: Value, a: Value | Number, b: Value | Number) -> Value:
+        return self.wrapped(self.pool.select(condition.node, self.node(a), self.node(b)))
+
+    def finite(self, a: Value) -> Value:
+        """Whether a number is neither infinite nor NaN."""
+        if a.constant is not None:
+            return self.wrapped(self.pool.boolean(True))
+        return self.wrapped(self.pool.make("finite", (a.node,), kind=BOOL))
+
+    def name(self, value: Value, name: str) -> Value:
+        """Keep a value under a name of the model; constants and what has a name keep theirs."""
+        if value.node.op not in ("const", "field") and value.node not in self.names:
+            self.names[value.node] = name
+        return value
+
+    # statements ------------------------------------------------------------------------------------
+
+    def section(self, text: str) -> None:
+        self.block.items.append(Section(text))
+
+    def store(self, name: str, index: int | Value | None, value: Value) -> None:
+        self.block.items.append(Store(name, None if index is None else self.node(index, INT), value.node))
+
+    def guard(self, condition: Value, status: str, why: str = "", before: list[Store] | None = None) -> None:
+        """End with an error where the condition holds; a condition known to be false leaves nothing."""
+        if condition.constant == 0:
+            return
+        self.block.items.append(Guard(condition.node, status, before or [], why))
+
+    def flag(self, condition: Value, flag: str) -> None:
+        """Warn with this flag where the condition holds."""
+        if condition.constant != 0:
+            self.block.items.append(Flag(condition.node, flag))
+
+    def array(self, name: str, size: int) -> Array:
+        """A local array, not initialised."""
+        self.block.items.append(Declare(name, size))
+        return Array(self, name)
+
+    def variable(self, name: str, value: Value | Number) -> Variable:
+        """A local that may be assigned again, as loops need."""
+        self.block.items.append(Declare(name, None, self.node(value)))
+        return Variable(self, name)
+
+    @contextmanager
+    def loop(self, variable: str, start: int | Value, stop: int | Value, down: bool = False) -> Iterator[Value]:
+        """A loop over variable = start .. stop - 1 (downwards if asked); yields the counter."""
+        counter = self.pool.fresh("counter", (), variable, INT)
+        counter.volatile = False
+        statement = For(variable, self.node(start, INT), self.node(stop, INT), [], down)
+        with self._scope(statement):
+            yield self.wrapped(counter)
+
+    @contextmanager
+    def when(self, condition: Value) -> Iterator[None]:
+        with self._scope(If(condition.node, [])):
+            yield
+
+    @contextmanager
+    def _scope(self, statement: For | If) -> Iterator[None]:
+        self.block.items.append(statement)
+        outer, self.block = self.block, Block()
+        self.blocks[id(statement)] = self.block
+        mark = self.pool.mark()
+        yield
+        self.pool.forget(mark)  # what was made inside is not in scope outside
+        self.block = outer
+
+
+class _RecordingPool(Pool):
+    """A pool that leaves each new node in the current block, where it was first made."""
+
+    def __init__(self, trace: Trace) -> None:
+        self._trace = trace
+        self._made: list[tuple[object, ...]] = []
+        super().__init__()
+
+    def make(self, op, args=(), data=None, kind="real", volatile=False):  # type: ignore[no-untyped-def]
+        before = self._count
+        node = super().make(op, args, data, kind, volatile)
+        if self._count != before and op != "const":
+            self._trace.block.items.append(node)
+            self._made.append((op, tuple(a.serial for a in args), data, kind))
+        return node
+
+    def fresh(self, op: str, args: tuple[Node, ...], data: object, kind: str) -> Node:
+        node = super().fresh(op, args, data, kind)
+        self._trace.block.items.append(node)
+        return node
+
+    def mark(self) -> int:
+        return len(self._made)
+
+    def forget(self, mark: int) -> None:
+        for key in self._made[mark:]:
+            self._nodes.pop(key, None)
+        del self._made[mark:]
+
+
+@dataclass(frozen=True)
+class Array:
+    """A local array of the traced function."""
+
+    trace: Trace
+    name: str
+
+    def __getitem__(self, index: int | Value) -> Value:
+        t = self.trace
+        return t.wrapped(t.pool.fresh("read", (t.node(index, INT),), self.name, "real"))
+
+    def __setitem__(self, index: int | Value, value: Value | Number) -> None:
+        t = self.trace
+        t.block.items.append(Assign(self.name, t.node(index, INT), t.node(value)))
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A local variable of the traced function."""
+
+    trace: Trace
+    name: str
+
+    def get(self) -> Value:
+        return self.trace.wrapped(self.trace.pool.fresh("read", (), self.name, "real"))
+
+    def set(self, value: Value | Number) -> None:
+        self.trace.block.items.append(Assign(self.name, None, self.trace.node(value)))

@@ -1,0 +1,63 @@
+"""Expression trees of the spec as SymPy expressions, exact: decimals are rationals, constants substituted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import sympy
+
+from kfgen.model import functions as kf
+from kfgen.spec.tree import Call, Name, Number, Tree
+
+
+def to_sympy(tree: Tree, names: Mapping[str, Any]) -> Any:
+    """The SymPy expression of a tree; names maps every name of it to an expression."""
+    if isinstance(tree, Number):
+        return sympy.Rational(tree.value.numerator, tree.value.denominator)
+    if isinstance(tree, Name):
+        if tree.name == "pi":
+            return sympy.pi
+        if tree.name == "e" and "e" not in names:
+            return sympy.E
+        return names[tree.name]
+    assert isinstance(tree, Call)
+    return _CALLS[tree.op](*[to_sympy(argument, names) for argument in tree.args])
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    if exponent == sympy.Rational(1, 2):
+        return kf.root(base)
+    if exponent == sympy.Rational(-1, 2):
+        return 1 / kf.root(base)
+    return base**exponent
+
+
+_CALLS: dict[str, Callable[..., Any]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "pow": _power,
+    "neg": lambda a: -a,
+    "lt": kf.Less,
+    "le": kf.LessEqual,
+    "gt": lambda a, b: kf.Less(b, a),
+    "ge": lambda a, b: kf.LessEqual(b, a),
+    "and": kf.Both,
+    "or": kf.Either,
+    "not": kf.Negation,
+    "sin": sympy.sin, "cos": sympy.cos, "tan": sympy.tan,
+    "asin": sympy.asin, "acos": sympy.acos, "atan": sympy.atan, "atan2": kf.Atan2,
+    "sinh": sympy.sinh, "cosh": sympy.cosh, "tanh": sympy.tanh,
+    "exp": sympy.exp, "log": sympy.log,
+    "sqrt": kf.root,
+    "hypot": lambda a, b: kf.Norm(a, b),
+    "abs": kf.Absolute,
+    "sign": kf.Sign,
+    "min": kf.Minimum,
+    "max": kf.Maximum,
+    "floor": kf.Floor,
+    "where": kf.Where,
+    "table": kf.Table,
+}  # fmt: skip

@@ -1,0 +1,205 @@
+"""A whole log through a compiled filter at C speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kfgen.errors import KfgenError
+from kfgen.logs import Log, Source, as_log
+from kfgen.native.values import Array
+from kfgen.spec.constants import value
+from kfgen.spec.types import Spec
+from kfgen.status import ERROR, Status
+
+if TYPE_CHECKING:
+    from kfgen.native.filter import NativeFilter
+
+CHUNK = 1 << 15
+"""Rows per call of the C driver: long enough to cost nothing, short enough for a progress bar and Ctrl-C."""
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run gives, one entry per row of the log.
+
+    t: [N] s, of the log, or step * dt. x: [N, n]. var: [N, n], the covariance's diagonal. nis: sensor -> [N],
+    NaN where that sensor was not updated or its update failed. status: [N] uint32, the bits of all calls of
+    the row. calls: function -> [N] uint32, its own status (0 where it was not called). mu: [N, modes] for an
+    imm, else None.
+    """
+
+    t: Array
+    x: Array
+    var: Array
+    nis: Mapping[str, Array]
+    status: NDArray[np.uint32]
+    calls: Mapping[str, NDArray[np.uint32]]
+    mu: Array | None = None
+
+    def counts(self, errors: bool = True) -> dict[str, dict[Status, int]]:
+        """How often each function returned each error (or warning) bit; functions without are left out."""
+        flags = [flag for flag in Status if flag and (flag >= ERROR) == errors]
+        found: dict[str, dict[Status, int]] = {}
+        for function, status in self.calls.items():
+            number = {flag: int(np.count_nonzero(status & flag.value)) for flag in flags}
+            number = {flag: n for flag, n in number.items() if n}
+            if number:
+                found[function] = number
+        return found
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be done in each row; float64, physical.
+
+    step: [N] whether to predict. dt: [N] s. u: [N, nu]. mask: [N, sensors] bits of the components to use, 0
+    for no update. z: [N, components of all sensors], 0 where there is none. t: [N] s.
+    """
+
+    t: Array
+    step: NDArray[np.uint8]
+    dt: Array
+    u: Array
+    mask: NDArray[np.uint32]
+    z: Array
+
+
+def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
+    """The rows of a log as calls of a filter.
+
+    Per row: predict, then the updates in the spec's order. Run-time dt: t minus the t of the row before; no
+    predict in the first row and where t is equal. Fixed dt (`dt` gives it in s for `t`): one predict per row.
+    A sensor is updated where all its components are there; with `partial: true` the components that are there
+    are used, otherwise a half-filled row of a sensor is no measurement. An empty input keeps the value of the
+    row before; an input that is empty in the first row is a KfgenError.
+    """
+    rows, columns = log.rows, log.columns
+    run_time = spec.dt is not None and spec.dt.run_time
+    if run_time:
+        t = columns["t"]
+        difference = np.diff(t, prepend=t[:1])
+        step = difference != 0
+    else:
+        t = columns["t"] if "t" in columns else np.arange(1.0, rows + 1) * (dt or 1.0)
+        difference, step = np.zeros(rows), np.ones(rows, dtype=bool)
+    u = np.empty((rows, len(spec.inputs)))
+    for i, each in enumerate(spec.inputs):
+        u[:, i] = _held(columns[each.name], each.name, log.source)
+    mask = np.zeros((rows, len(spec.measurements)), dtype=np.uint32)
+    values: list[Array] = []
+    absent = np.full(rows, np.nan)
+    for i, sensor in enumerate(spec.measurements):
+        names = [f"{sensor.name}.{each.name}" for each in sensor.components]
+        z = np.column_stack([columns.get(name, absent) for name in names])
+        bits = (~np.isnan(z)) @ (1 << np.arange(z.shape[1]))
+        full = (1 << z.shape[1]) - 1
+        mask[:, i] = bits if sensor.partial else np.where(bits == full, full, 0)
+        values.append(np.where(np.isnan(z), 0.0, z))
+    return Plan(
+        t, step.astype(np.uint8), difference, u, mask, np.hstack(values) if values else np.empty((rows, 0))
+    )
+
+
+def _held(column: Array, name: str, source: str) -> Array:
+    """Empty cells take the last value before them."""
+    there = ~np.isnan(column)
+    if column.size and not there[0]:
+        raise KfgenError(f"{source}: input `{name}` is empty in the first row; there is no value to keep")
+    last = np.maximum.accumulate(np.where(there, np.arange(column.size), 0))
+    return column[last]
+
+
+def run(kf: NativeFilter, source: Source, progress: Callable[[int, int], None] | None = None) -> RunResult:
+    """Run `kf` over a log (a path, a mapping of columns, or a Log), on from its present state.
+
+    See `plan` for what is done in a row. The filter's errors are in the result, none is raised. `progress` is
+    called with (rows done, rows) now and then. KfgenError for a log that does not fit the spec.
+    """
+    spec = kf.spec
+    log = as_log(source, spec)
+    work = plan(spec, log, _fixed_step(spec))
+    rows, n, sensors = log.rows, len(kf.states), len(spec.measurements)
+    modes = len(spec.imm.modes) if spec.imm else 0
+    scalar, units = kf._value, kf._units
+
+    z_units = np.concatenate([units.z[name] for name in kf.sensors]) if sensors else np.empty(0)
+    arrays: dict[str, NDArray[Any]] = {
+        "step": work.step,
+        "dt": scalar.to_raw(work.dt, units.dt),
+        "u": scalar.to_raw(work.u, units.u),
+        "mask": work.mask.copy(),
+        "z": scalar.to_raw(work.z, z_units),
+        "x": np.zeros((rows, n), scalar.dtype),
+        "var": np.zeros((rows, n), scalar.dtype),
+        "nis": np.zeros((rows, sensors), scalar.dtype),
+        "mu": np.zeros((rows, modes), scalar.dtype),
+        "status": np.zeros((rows, sensors + 1), np.uint32),
+    }
+    if not scalar.representable(np.concatenate([work.u.ravel(), work.z.ravel(), work.dt])):
+        _refuse(work, arrays, spec)
+    _call(kf, arrays, rows, progress)
+
+    nis = scalar.to_physical(arrays["nis"], units.one)
+    status: NDArray[np.uint32] = arrays["status"]
+    updated = (arrays["mask"] != 0) & (status[:, 1:] < ERROR)
+    functions = ["predict", *(f"update_{name}" for name in kf.sensors)]
+    return RunResult(
+        t=work.t,
+        x=scalar.to_physical(arrays["x"], units.x),
+        var=scalar.to_physical(arrays["var"], np.diag(units.P))
+        if kf._header.has("get_covariance")
+        else np.full((rows, n), np.nan),
+        nis={name: np.where(updated[:, i], nis[:, i], np.nan) for i, name in enumerate(kf.sensors)},
+        status=np.bitwise_or.reduce(status, axis=1),
+        calls={function: status[:, i] for i, function in enumerate(functions)},
+        mu=scalar.to_physical(arrays["mu"], units.one) if modes else None,
+    )
+
+
+def _call(
+    kf: NativeFilter,
+    arrays: Mapping[str, NDArray[Any]],
+    rows: int,
+    progress: Callable[[int, int], None] | None,
+) -> None:
+    ffi, function = kf._ffi, getattr(kf._lib, f"{kf.name}_kfgen_run")
+    types = {"step": "uint8_t *", "mask": "uint32_t *", "status": "uint32_t *"}
+    contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    for first in range(0, rows, CHUNK):
+        count = min(CHUNK, rows - first)
+        pointers = [
+            ffi.from_buffer(types.get(name, f"{kf.name}_real_t *"), array[first : first + count])
+            if array.size
+            else ffi.NULL
+            for name, array in contiguous.items()
+        ]
+        function(kf._kf, count, *pointers)
+        if progress:
+            progress(first + count, rows)
+
+
+def _refuse(work: Plan, arrays: Mapping[str, NDArray[Any]], spec: Spec) -> None:
+    """Fixed point cannot carry NaN and infinity: answer calls with them here, as floating point would."""
+    status = arrays["status"]
+    wrong = ~np.isfinite(np.column_stack([work.u, work.dt])).all(axis=1) & (work.step != 0)
+    status[wrong, 0] = Status.NOT_FINITE
+    arrays["step"][wrong] = 0
+    first = 0
+    for i, sensor in enumerate(spec.measurements):
+        last = first + len(sensor.components)
+        wrong = ~np.isfinite(work.z[:, first:last]).all(axis=1)
+        status[wrong, i + 1] = Status.NOT_FINITE
+        arrays["mask"][wrong, i] = 0
+        first = last
+
+
+def _fixed_step(spec: Spec) -> float:
+    """A fixed dt in s, 0 without one."""
+    if spec.dt is None or spec.dt.run_time:
+        return 0.0
+    return float(value(spec.dt.nominal.tree, spec))

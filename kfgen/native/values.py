@@ -1,0 +1,129 @@
+"""How numbers cross the border: physical float64 in Python, the filter's own scalar type in C."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kfgen.errors import KfgenError
+from kfgen.native.header import Header
+from kfgen.spec.types import Spec
+
+Array = NDArray[np.float64]
+
+
+class Value(ABC):
+    """One scalar type of the emitted code. `unit` arguments are physical values of raw 1 (an `_LSB`)."""
+
+    dtype: np.dtype[Any]
+
+    @abstractmethod
+    def unit(self, name: str) -> float:
+        """The physical value of raw 1 of a quantity, by its macro's name without prefix (`PX`, `GNSS_X`)."""
+
+    @property
+    @abstractmethod
+    def one(self) -> float:
+        """The physical value of raw 1 of a number without a unit (nis, mu, a likelihood)."""
+
+    @abstractmethod
+    def representable(self, values: Array) -> bool:
+        """False where a call with these values can only be answered by NOT_FINITE."""
+
+    @abstractmethod
+    def to_raw(self, values: Array, unit: Array | float) -> NDArray[Any]: ...
+
+    @abstractmethod
+    def to_physical(self, raw: NDArray[Any], unit: Array | float) -> Array: ...
+
+
+class Floating(Value):
+    """float and double: the physical value; NaN and infinity are passed on for the filter to refuse."""
+
+    def __init__(self, dtype: type[np.floating[Any]]) -> None:
+        self.dtype = np.dtype(dtype)
+
+    def unit(self, name: str) -> float:
+        return 1.0
+
+    @property
+    def one(self) -> float:
+        return 1.0
+
+    def representable(self, values: Array) -> bool:
+        return True
+
+    def to_raw(self, values: Array, unit: Array | float) -> NDArray[Any]:
+        with np.errstate(
+            over="ignore", under="ignore", invalid="ignore"
+        ):  # too large for a float becomes infinite
+            return np.asarray(values, dtype=np.float64).astype(self.dtype)
+
+    def to_physical(self, raw: NDArray[Any], unit: Array | float) -> Array:
+        return np.asarray(raw).astype(np.float64)
+
+
+class Fixed(Value):
+    """q<m>.<n>: an int32 of the quantity's least significant bit; rounded and saturated on the way in."""
+
+    def __init__(self, header: Header) -> None:
+        self.dtype = np.dtype(np.int32)
+        self._macros = header.macros
+        self._prefix = header.prefix.upper()
+        self._fraction_bits = int(self._macro("FRACTION_BITS"))
+
+    def _macro(self, name: str) -> float:
+        try:
+            return self._macros[f"{self._prefix}_{name}"]
+        except KeyError:
+            raise KfgenError(f"the emitted header does not define {self._prefix}_{name}") from None
+
+    def unit(self, name: str) -> float:
+        return self._macro(f"{name.upper()}_LSB")
+
+    @property
+    def one(self) -> float:
+        return 2.0**-self._fraction_bits
+
+    def representable(self, values: Array) -> bool:
+        return bool(np.isfinite(values).all())
+
+    def to_raw(self, values: Array, unit: Array | float) -> NDArray[Any]:
+        scaled = np.nan_to_num(np.rint(np.asarray(values, dtype=np.float64) / unit))
+        clipped: Array = np.clip(scaled, -(2.0**31), 2.0**31 - 1)
+        return clipped.astype(np.int32)
+
+    def to_physical(self, raw: NDArray[Any], unit: Array | float) -> Array:
+        return np.asarray(raw).astype(np.float64) * unit
+
+
+def value_of(header: Header) -> Value:
+    """The scalar type a header was written for."""
+    if header.real == "float":
+        return Floating(np.float32)
+    if header.real == "double":
+        return Floating(np.float64)
+    if header.real == "int32_t":
+        return Fixed(header)
+    raise KfgenError(f"the emitted header has an unknown scalar type {header.real}")
+
+
+class Units:
+    """The physical values of raw 1 of everything that crosses the border, as arrays in the spec's order."""
+
+    def __init__(self, spec: Spec, value: Value) -> None:
+        self.x: Array = np.array([value.unit(state.name) for state in spec.states])
+        self.P: Array = np.outer(self.x, self.x) / value.one  # its LSB is LSB_i LSB_j 2^n
+        self.u: Array = np.array([value.unit(each.name) for each in spec.inputs])
+        self.z: dict[str, Array] = {
+            sensor.name: np.array([value.unit(f"{sensor.name}_{each.name}") for each in sensor.components])
+            for sensor in spec.measurements
+        }
+        self.R: dict[str, Array] = {name: np.outer(z, z) / value.one for name, z in self.z.items()}
+        self.parameters = {each.name: value.unit(each.name) for each in spec.parameters}
+        run_time = spec.dt is not None and spec.dt.run_time
+        self.dt = value.unit("dt") if run_time else 1.0
+        self.one = value.one

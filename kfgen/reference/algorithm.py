@@ -1,0 +1,141 @@
+"""What a filter type has to provide, and what all of them do with a new estimate.
+
+An Algorithm holds no state of its own: it maps estimates to estimates, so that a filter (or a bank of them)
+can drop a result and be what it was before.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kfgen.reference.dual import Matrix, Vector, value_of
+from kfgen.reference.evaluate import Closure
+from kfgen.reference.linalg import lower_root, udu
+from kfgen.reference.model import Context, Model
+from kfgen.reference.sensor import Reading
+from kfgen.reference.status import Status, StepError
+from kfgen.spec.tree import Expression
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """x (n), P (n, n), and whatever else the algorithm keeps between two steps."""
+
+    x: Vector
+    P: Matrix
+    memory: object = None
+
+
+@dataclass(frozen=True)
+class Innovation:
+    """What is known of an update before the gate: nis, and (for `correct`) whatever the algorithm wants."""
+
+    nis: float
+    detail: object = None
+
+
+@dataclass(frozen=True)
+class Correction:
+    """An update as made. log_likelihood is that of the innovations and variances it used."""
+
+    estimate: Estimate
+    log_likelihood: float
+    flags: Status = Status.OK
+
+
+class Algorithm(ABC):
+    """A filter type. Its methods raise StepError, or return finite, wrapped, bounded estimates."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.limits = Limits(model)
+
+    @abstractmethod
+    def predict(self, estimate: Estimate, context: Context) -> tuple[Estimate, Status]:
+        """The estimate one step later, and warnings."""
+
+    @abstractmethod
+    def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
+        """The innovation of a reading, by the plain residual and covariance: what the gate judges."""
+
+    @abstractmethod
+    def correct(self, estimate: Estimate, reading: Reading, innovation: Innovation) -> Correction:
+        """The update with a reading that has passed the gate."""
+
+
+class Limits:
+    """Floor, ceiling, bounds, wrapping and guards, in this order: the end of every step."""
+
+    def __init__(self, model: Model) -> None:
+        options = model.spec.filter
+        self.model = model
+        self._covariance = options.covariance
+        self._floor = self._compile(options.variance_floor)
+        self._ceiling = self._compile(options.variance_ceiling)
+
+    def _compile(self, entries: Mapping[str, Expression]) -> dict[int, Closure]:
+        return {self.model.index[name]: self.model.scope.compile(entry) for name, entry in entries.items()}
+
+    def finish(self, x: Vector, P: Matrix, context: Context) -> tuple[Vector, Matrix, Status]:
+        """The x (n) and P (n, n) that a step stores; REGULARIZED where a variance met its floor or ceiling.
+
+        Raises StepError NOT_FINITE.
+        """
+        if not (np.all(np.isfinite(x)) and np.all(np.isfinite(P))):
+            raise StepError(Status.NOT_FINITE)
+        flags = Status.OK
+        if self._floor or self._ceiling:
+            environment = self.model.environment(context, x)
+            floor, ceiling = np.zeros(self.model.n), np.full(self.model.n, np.inf)
+            for i, closure in self._floor.items():
+                floor[i] = value_of(closure(environment))
+            for i, closure in self._ceiling.items():
+                ceiling[i] = value_of(closure(environment))
+            P, changed = _FORMS[self._covariance](P, floor, ceiling)
+            flags = Status.REGULARIZED if changed else flags
+        return self.model.wrap(self.model.clip(x)), P, flags
+
+
+def _limit_full(P: Matrix, floor: Vector, ceiling: Vector) -> tuple[Matrix, bool]:
+    """P_ii raised to the floor; where it exceeds the ceiling its row and column are scaled to it."""
+    variances = P.diagonal()
+    raised = np.maximum(variances, floor)
+    if not np.any(raised > variances) and not np.any(raised > ceiling):
+        return P, False
+    P = P.copy()
+    np.fill_diagonal(P, raised)
+    scale = np.ones(len(P))
+    above = raised > ceiling
+    scale[above] = np.sqrt(ceiling[above] / raised[above])
+    return P * np.outer(scale, scale), True
+
+
+def _limit_ud(P: Matrix, floor: Vector, ceiling: Vector) -> tuple[Matrix, bool]:
+    """D_j of P = U D U^T, in the spec's order of the states, clamped to [floor, ceiling]."""
+    U, D = udu(P)
+    clamped = np.minimum(np.maximum(D, floor), ceiling)
+    if np.array_equal(clamped, D):
+        return P, False
+    return (U * clamped) @ U.T, True
+
+
+def _limit_sqrt(P: Matrix, floor: Vector, ceiling: Vector) -> tuple[Matrix, bool]:
+    """S_ii^2 of P = S S^T raised to the floor; where it exceeds the ceiling row i of S is scaled to it."""
+    S = lower_root(P)
+    pivots = S.diagonal() ** 2
+    raised = np.maximum(pivots, floor)
+    above = raised > ceiling
+    if not np.any(raised > pivots) and not np.any(above):
+        return P, False
+    np.fill_diagonal(S, np.sqrt(raised))
+    scale = np.ones(len(P))
+    scale[above] = np.sqrt(ceiling[above] / raised[above])
+    S = S * scale[:, None]
+    return S @ S.T, True
+
+
+_FORMS = {"full": _limit_full, "ud": _limit_ud, "sqrt": _limit_sqrt}

@@ -1,0 +1,265 @@
+"""The reference filter: the interface of a compiled filter around a dense textbook algorithm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import chi2
+
+from kfgen.reference.algorithm import Algorithm, Correction, Estimate
+from kfgen.reference.clock import Clock
+from kfgen.reference.dual import Matrix, Vector
+from kfgen.reference.linalg import udu
+from kfgen.reference.log import Run, replay
+from kfgen.reference.model import Context, Model, fixed_step
+from kfgen.reference.sensor import Reading, SensorModel
+from kfgen.reference.status import Status, StepError
+from kfgen.spec.types import Gate, Spec
+
+
+class Parameters(MutableMapping[str, float]):
+    """The run-time parameters by name: values may be changed, names neither added nor removed."""
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        self._values = dict(values)
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def __setitem__(self, name: str, value: float) -> None:
+        if name not in self._values:
+            raise KeyError(name)
+        self._values[name] = float(value)
+
+    def __delitem__(self, name: str) -> None:
+        raise TypeError("parameters cannot be removed")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        return f"Parameters({self._values})"
+
+
+@dataclass(frozen=True)
+class _Step:
+    """The bounds of a run-time step in s; None where it has none."""
+
+    run_time: bool
+    nominal: float
+    minimum: float | None
+    maximum: float | None
+
+    def clamped(self, dt: float) -> tuple[float, Status]:
+        """dt within its bounds, and DT_CLAMPED where that changed it. Raises StepError NOT_POSITIVE."""
+        if self.minimum is not None and dt < self.minimum:
+            return self.minimum, Status.DT_CLAMPED
+        if self.minimum is None and dt <= 0.0:
+            raise StepError(Status.NOT_POSITIVE)
+        if self.maximum is not None and dt > self.maximum:
+            return self.maximum, Status.DT_CLAMPED
+        return dt, Status.OK
+
+
+class ReferenceFilter:
+    """One filter, in float64 and physical units.
+
+    Attributes (arrays are copies):
+        x (n), P (n, n): the estimate, in the spec's order of the states.
+        nis: normalised innovation squared of the last update, also of a gated one; 0 after init.
+        log_likelihood: of the last update that was made.
+        t: seconds since init.
+        parameters: name -> value, changeable; back at the spec's values after init.
+        gate_count: sensor -> rejections in a row.
+    Steps return the status bits as an int and never raise for what the filter meets; a call of the wrong
+    shape (a missing u, an unknown sensor) raises TypeError, ValueError or KeyError.
+    """
+
+    def __init__(self, spec: Spec, algorithm: Algorithm) -> None:
+        self.spec = spec
+        self.model: Model = algorithm.model
+        self.algorithm = algorithm
+        self.sensors = {sensor.name: SensorModel(self.model, sensor) for sensor in spec.measurements}
+        self._gates: dict[str, tuple[Gate, float]] = {
+            sensor.name: (sensor.gate, self.model.number(sensor.gate.probability))
+            for sensor in spec.measurements
+            if sensor.gate is not None
+        }
+        self._thresholds: dict[tuple[str, int], float] = {}
+        self._step = self._read_step()
+        self._fixed = fixed_step(spec)
+        self.init()
+
+    def _read_step(self) -> _Step:
+        dt, number = self.spec.dt, self.model.number
+        if dt is None:
+            return _Step(False, 1.0, None, None)
+        return _Step(
+            dt.run_time,
+            number(dt.nominal),
+            None if dt.minimum is None else number(dt.minimum),
+            None if dt.maximum is None else number(dt.maximum),
+        )
+
+    @property
+    def x(self) -> Vector:
+        return self._estimate.x.copy()
+
+    @property
+    def P(self) -> Matrix:
+        return self._estimate.P.copy()
+
+    @property
+    def t(self) -> float:
+        return self._clock.now
+
+    def init(self) -> int:
+        """Back to the spec: estimate, parameters, time, counters."""
+        self._estimate = Estimate(self.model.x0, self.model.P0)
+        self.parameters = Parameters(self.model.values)
+        # without a dt the spec has no seconds: t then counts steps
+        self._clock = Clock(Fraction(1) if self.spec.dt is None else self._fixed)
+        self.nis = 0.0
+        self.log_likelihood = 0.0
+        self.gate_count = dict.fromkeys(self.sensors, 0)
+        self._uninitialised = self.spec.initialize is not None
+        return int(Status.OK)
+
+    def set_state(self, x: ArrayLike) -> int:
+        """Sets x (n), wrapped; NOT_FINITE leaves the filter as it was."""
+        new = np.array(x, dtype=np.float64).reshape(self.model.n)
+        if not np.all(np.isfinite(new)):
+            return int(Status.NOT_FINITE)
+        self._estimate = Estimate(self.model.wrap(new), self._estimate.P)
+        return int(Status.OK)
+
+    def set_covariance(self, P: ArrayLike) -> int:
+        """Sets P (n, n) from its upper triangle; NOT_FINITE and NOT_POSITIVE leave the filter as it was."""
+        given = np.array(P, dtype=np.float64).reshape(self.model.n, self.model.n)
+        new = np.triu(given) + np.triu(given, 1).T
+        try:
+            if not np.all(np.isfinite(new)):
+                raise StepError(Status.NOT_FINITE)
+            U, D = udu(new, computed=False)
+        except StepError as error:
+            return int(error.status)
+        if np.any(D == 0.0):
+            # a pivot that is negative or positive only by rounding is the zero it stands for
+            new = (U * D) @ U.T
+        self._estimate = Estimate(self._estimate.x, new)
+        return int(Status.OK)
+
+    def predict(self, u: ArrayLike | None = None, dt: float | None = None) -> int:
+        """One step: u (nu) where the spec has inputs, dt in s where the step is an argument."""
+        inputs = self._inputs(u, needed=bool(self.model.inputs))
+        if self._step.run_time and dt is None:
+            raise TypeError("predict: this filter takes dt")
+        try:
+            step, flags = self._step.nominal, Status.OK
+            if not np.all(np.isfinite(inputs)) or (dt is not None and not math.isfinite(dt)):
+                raise StepError(Status.NOT_FINITE)
+            if self._step.run_time and dt is not None:
+                step, flags = self._step.clamped(float(dt))
+            context = Context(self.parameters, inputs, self._clock.now, step)
+            with np.errstate(all="ignore"):
+                estimate, warnings = self.algorithm.predict(self._estimate, context)
+        except StepError as error:
+            return int(error.status)
+        self._estimate, self._clock = estimate, self._clock.advanced(step)
+        return int(flags | warnings)
+
+    def update(
+        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None
+    ) -> int:
+        """An update with z (m); u (nu) where the sensor takes inputs; mask: bit i for component i."""
+        model = self.sensors[sensor]
+        measured = np.array(z, dtype=np.float64).reshape(model.m)
+        inputs = self._inputs(u, needed=model.takes_inputs)
+        used = _used(model, mask)
+        if not used:
+            return int(Status.OK)
+        reading = Reading(model, measured, used, Context(self.parameters, inputs, self._clock.now, 0.0))
+        try:
+            if not np.all(np.isfinite(measured[list(used)])) or not np.all(np.isfinite(inputs)):
+                raise StepError(Status.NOT_FINITE)
+            if self._initialises(reading):
+                return int(self._initialise(reading))
+            with np.errstate(all="ignore"):
+                return int(self._judge(reading))
+        except StepError as error:
+            return int(error.status)
+
+    def run(self, log: Mapping[str, Sequence[float]]) -> Run:
+        """Replays a log from the filter's present state: see kfgen.reference.log.replay."""
+        return replay(self, log)
+
+    def _inputs(self, u: ArrayLike | None, needed: bool) -> Vector:
+        if u is None:
+            if needed:
+                raise TypeError(f"this filter takes u: {', '.join(self.model.inputs)}")
+            return np.zeros(len(self.model.inputs))
+        return np.array(u, dtype=np.float64).reshape(len(self.model.inputs))
+
+    def _judge(self, reading: Reading) -> Status:
+        """An update behind the gate: the whole vector, or nothing of it."""
+        name = reading.sensor.name
+        innovation = self.algorithm.innovate(self._estimate, reading)
+        flags = Status.OK
+        if name in self._gates and innovation.nis > self._threshold(name, len(reading.used)):
+            reset_after = self._gates[name][0].reset_after
+            if reset_after is None or self.gate_count[name] < reset_after:
+                self.nis = innovation.nis
+                self.gate_count[name] += 1
+                return Status.GATED
+            flags = Status.ANOMALY
+        correction: Correction = self.algorithm.correct(self._estimate, reading, innovation)
+        self._estimate = correction.estimate
+        self.nis, self.log_likelihood = innovation.nis, correction.log_likelihood
+        self.gate_count[name] = 0
+        return flags | correction.flags
+
+    def _threshold(self, sensor: str, used: int) -> float:
+        """The chi-square quantile of a sensor's gate with so many components."""
+        key = (sensor, used)
+        if key not in self._thresholds:
+            self._thresholds[key] = float(chi2.ppf(self._gates[sensor][1], used))
+        return self._thresholds[key]
+
+    def _initialises(self, reading: Reading) -> bool:
+        """Whether this reading is the first one of the sensor that sets the initial states."""
+        rule = self.spec.initialize
+        if rule is None or not self._uninitialised or rule.sensor != reading.sensor.name:
+            return False
+        components = reading.sensor.components
+        return all(components.index(component) in reading.used for component in rule.states.values())
+
+    def _initialise(self, reading: Reading) -> Status:
+        """Sets the states that the spec names from the reading; the covariance stays, no update is made."""
+        rule = self.spec.initialize
+        assert rule is not None
+        x = self.x
+        for state, component in rule.states.items():
+            x[self.model.index[state]] = reading.z[reading.sensor.components.index(component)]
+        self._estimate = Estimate(self.model.wrap(self.model.clip(x)), self._estimate.P)
+        self._uninitialised = False
+        self.nis = 0.0
+        return Status.OK
+
+
+def _used(sensor: SensorModel, mask: int | Sequence[bool] | None) -> tuple[int, ...]:
+    """The components that a mask selects; all without one."""
+    if mask is None:
+        return tuple(range(sensor.m))
+    if not sensor.partial:
+        raise TypeError(f"sensor {sensor.name} takes no mask")
+    if isinstance(mask, int | np.integer):
+        return tuple(i for i in range(sensor.m) if int(mask) >> i & 1)
+    return tuple(i for i, bit in enumerate(mask) if bit)

@@ -1,0 +1,93 @@
+"""A whole log through a filter, row by row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kfgen.reference.dual import Matrix, Vector
+from kfgen.reference.status import Status
+
+if TYPE_CHECKING:
+    from kfgen.reference.filter import ReferenceFilter
+
+
+@dataclass(frozen=True)
+class Run:
+    """A filter's course over a log of r rows, after each row.
+
+    x (r, n), var (r, n): the estimate and the diagonal of its covariance. nis: sensor -> (r), NaN in rows
+    without an update of it (or with one that failed). status (r): the bits of the row's calls, or-ed.
+    """
+
+    x: Matrix
+    var: Matrix
+    nis: dict[str, Vector]
+    status: NDArray[np.int64]
+
+
+def replay(kf: ReferenceFilter, log: Mapping[str, Sequence[float]]) -> Run:
+    """Per row: predict, then the updates in the spec's order.
+
+    The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`) to values, NaN where there is no
+    measurement. Run-time dt: t minus the last row's t, no predict in the first row and for equal t; fixed dt:
+    one predict per row. A sensor with missing components is updated with the others where it is `partial`,
+    and not at all where it is not. Raises ValueError for a missing column (all columns of a sensor may be
+    missing).
+    """
+    columns = {name: np.asarray(column, dtype=np.float64) for name, column in log.items()}
+    rows = len(next(iter(columns.values()), ()))
+    run_time = kf.spec.dt is not None and kf.spec.dt.run_time
+    needed = [*kf.model.inputs, *(["t"] if run_time else [])]
+    missing = [name for name in needed if name not in columns]
+    if missing:
+        raise ValueError(f"the log has no column {', '.join(missing)}")
+    inputs = np.column_stack([columns[name] for name in kf.model.inputs] or [np.zeros((rows, 0))])
+    readings: dict[str, Matrix] = {}
+    for sensor in kf.sensors.values():
+        names = [f"{sensor.name}.{component}" for component in sensor.components]
+        if any(name in columns for name in names):
+            absent = np.full(rows, math.nan)
+            readings[sensor.name] = np.column_stack([columns.get(name, absent) for name in names])
+
+    result = Run(
+        np.zeros((rows, kf.model.n)),
+        np.zeros((rows, kf.model.n)),
+        {name: np.full(rows, math.nan) for name in kf.sensors},
+        np.zeros(rows, dtype=np.int64),
+    )
+    last: float | None = None
+    for row in range(rows):
+        u = inputs[row] if kf.model.inputs else None
+        status = 0
+        if run_time:
+            t = float(columns["t"][row])
+            if last is not None and t != last:
+                status |= kf.predict(u, t - last)
+            if math.isfinite(t):
+                last = t
+        else:
+            status |= kf.predict(u)
+        for name, reading in readings.items():
+            status |= _measure(kf, name, reading[row], u, result, row)
+        result.status[row] = status
+        result.x[row], result.var[row] = kf.x, kf.P.diagonal()
+    return result
+
+
+def _measure(kf: ReferenceFilter, name: str, z: Vector, u: Vector | None, result: Run, row: int) -> int:
+    """One sensor of one row: its status, 0 where there is nothing to do."""
+    sensor = kf.sensors[name]
+    present = ~np.isnan(z)
+    if not np.any(present) or not (sensor.partial or np.all(present)):
+        return 0
+    mask = sum(1 << i for i in range(sensor.m) if present[i]) if sensor.partial else None
+    status = kf.update(name, z, u if sensor.takes_inputs else None, mask)
+    if status < Status.ERROR:
+        result.nis[name][row] = kf.nis
+    return status

@@ -1,0 +1,145 @@
+"""The measurement model of one sensor: its prediction, Jacobian, noise covariance and innovation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kfgen.reference.dual import Matrix, Number, Vector, jacobian, value_of, values, variables
+from kfgen.reference.evaluate import Closure
+from kfgen.reference.linalg import symmetric
+from kfgen.reference.model import PREDICTED, Context, Model, Z, wrap
+from kfgen.reference.status import Status, StepError
+from kfgen.spec.tree import Call, Expression, Name, Tree, names
+from kfgen.spec.types import Sensor
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A measurement to be processed: z (m), of which the components `used` count."""
+
+    sensor: SensorModel
+    z: Vector
+    used: tuple[int, ...]
+    context: Context
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Of the k components in use: h (k) the prediction, H (k, n) its Jacobian, R (k, k) the covariance of the
+    measurement noise, that of the noise inputs included."""
+
+    h: Vector
+    H: Matrix
+    R: Matrix
+
+
+class SensorModel:
+    """One sensor of a spec.
+
+    Attributes: name; components: their names; m: how many; takes_inputs: whether h, R or what they use
+    contain inputs, so that an update needs u; partial: whether an update may be masked.
+    """
+
+    def __init__(self, model: Model, sensor: Sensor) -> None:
+        self.model = model
+        self.spec = sensor
+        self.name = sensor.name
+        self.components = tuple(component.name for component in sensor.components)
+        self.m = len(self.components)
+        self.partial = sensor.partial
+        self._h = [model.scope.compile(component.h) for component in sensor.components]
+        self._periods = [
+            None if component.period is None else model.number(component.period)
+            for component in sensor.components
+        ]
+        self._residuals: list[Closure | None] = [
+            None if c.residual is None else model.scope.compile(_private(c.residual.tree))
+            for c in sensor.components
+        ]
+        own = {c.name: c.variance for c in sensor.components if c.variance is not None}
+        self._R = model.covariance(own if sensor.R is None else sensor.R, self.components)
+        self._noises = [noise.name for noise in sensor.noise]
+        self._Re = model.noise_covariance(sensor.noise, sensor.noise_covariance)
+        self.takes_inputs = bool(_reach(model, sensor) & set(model.inputs))
+
+    def predict(
+        self, x: Sequence[Number], e: Sequence[Number], context: Context, used: Sequence[int]
+    ) -> list[Number]:
+        """h of the components in use at the state x (n) and the noise inputs e."""
+        environment = self.model.environment(context, x, dict(zip(self._noises, e, strict=True)))
+        return [self._h[i](environment) for i in used]
+
+    def linearise(self, x: Vector, reading: Reading) -> Linearisation:
+        """h, H and R + M Re M^T at x (n), M = dh/de at e = 0. Raises StepError NOT_FINITE.
+
+        Whether R is a covariance is for the update to judge, after all that could be not finite.
+        """
+        n, k = self.model.n, len(self._noises)
+        joint = variables([*x, *np.zeros(k)])
+        predicted = self.predict(joint[:n], joint[n:], reading.context, reading.used)
+        derivatives = jacobian(predicted, n + k)
+        environment = self.model.environment(reading.context, x)
+        R, Re = self._R(environment, reading.used), self._Re(environment)
+        h, H, M = values(predicted), derivatives[:, :n], derivatives[:, n:]
+        R = symmetric(R + M @ Re @ M.T)
+        if not (np.all(np.isfinite(h)) and np.all(np.isfinite(H)) and np.all(np.isfinite(R))):
+            raise StepError(Status.NOT_FINITE)
+        return Linearisation(h, H, R)
+
+    def innovation(self, h: Vector, x: Vector, reading: Reading) -> Vector:
+        """z - h of the components in use, wrapped where periodic, or by the component's own residual.
+
+        h (k) is the prediction made at x (n); an own residual may use x as h does.
+        Raises StepError NOT_FINITE.
+        """
+        environment = self.model.environment(reading.context, x)
+        y = np.zeros(len(reading.used))
+        for k, i in enumerate(reading.used):
+            z, predicted = float(reading.z[i]), float(h[k])
+            residual, period = self._residuals[i], self._periods[i]
+            if residual is not None:
+                environment[self.model.scope.slots[Z]] = z
+                environment[self.model.scope.slots[PREDICTED]] = predicted
+                y[k] = value_of(residual(environment))
+            elif period is not None:
+                y[k] = wrap(z - predicted, period)
+            else:
+                y[k] = z - predicted
+        if not np.all(np.isfinite(y)):
+            raise StepError(Status.NOT_FINITE)
+        return y
+
+
+def _private(tree: Tree) -> Tree:
+    """The tree of a residual with `z` and `h` as names that no state can have."""
+    if isinstance(tree, Name):
+        return {"z": Name(Z), "h": Name(PREDICTED)}.get(tree.name, tree)
+    if isinstance(tree, Call):
+        return replace(tree, args=tuple(_private(argument) for argument in tree.args))
+    return tree
+
+
+def _reach(model: Model, sensor: Sensor) -> set[str]:
+    """Every name that the sensor's formulas use, through definitions too."""
+    formulas: list[Expression | None] = []
+    for component in sensor.components:
+        formulas += [component.h, component.variance]
+    formulas += [noise.variance for noise in sensor.noise]
+    for matrix in (sensor.R, sensor.noise_covariance):
+        formulas += [entry for row in matrix or () for entry in row]
+    definitions = {definition.name: definition.value for definition in model.spec.let}
+    found: set[str] = set()
+    trees = [formula.tree for formula in formulas if formula is not None]
+    trees += [
+        _private(component.residual.tree) for component in sensor.components if component.residual is not None
+    ]
+    pending = [name for tree in trees for name in names(tree)]
+    while pending:
+        name = pending.pop()
+        if name not in found:
+            found.add(name)
+            pending += names(definitions[name].tree) if name in definitions else ()
+    return found

@@ -1,0 +1,10 @@
+"""Scalar types: how a number of the program is spelled in C, and computed in Python to the same bits."""
+
+from __future__ import annotations
+
+from kfgen.scalars.base import Scalar
+from kfgen.scalars.floating import DOUBLE, FLOAT
+
+SCALARS: dict[str, Scalar] = {"float": FLOAT, "double": DOUBLE}
+
+__all__ = ["SCALARS", "Scalar"]

@@ -1,0 +1,41 @@
+"""What a scalar type offers."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any, Protocol
+
+
+class Scalar(Protocol):
+    """A number type of the emitted C.
+
+    helpers names the template that defines the static functions `<prefix>_<op>` of the operations that
+    `helper_ops` lists; they are emitted only where used.
+    """
+
+    name: str
+    c_type: str
+    size: int  # bytes
+    helpers: str
+    helper_ops: frozenset[str]
+    epsilon: Fraction  # relative spacing at 1
+
+    def literal(self, value: Fraction) -> str:
+        """A constant, rounded once, as C reads it back to the same value."""
+        ...
+
+    def nearest(self, value: Fraction) -> Fraction:
+        """The representable value nearest to value."""
+        ...
+
+    def function(self, op: str) -> str:
+        """The libm function of an operation."""
+        ...
+
+    def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
+        """The operation on numbers of this type, as the emitted C computes it."""
+        ...
+
+    def convert(self, value: Any) -> Any:
+        """A Python number as a number of this type."""
+        ...

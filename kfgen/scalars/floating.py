@@ -1,0 +1,168 @@
+"""float and double: C spelling, and the same arithmetic in numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+_LIBM = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "floor",
+         "atan2", "pow")  # fmt: skip
+
+
+class Floating:
+    """An IEEE 754 type."""
+
+    helpers = "helpers_float.j2"
+    helper_ops = frozenset({"finite", "wrap", "table", "slope", "min", "max", "sign"})
+
+    def __init__(self, name: str, dtype: type[np.floating[Any]], suffix: str) -> None:
+        self.name = self.c_type = name
+        self.dtype = dtype
+        self.suffix = suffix
+        info = np.finfo(dtype)
+        self.size = info.bits // 8
+        self.epsilon = Fraction(float(info.eps))
+        self._mantissa = info.nmant + 1
+        self._smallest = int(info.minexp) - info.nmant
+
+    def nearest(self, value: Fraction) -> Fraction:
+        """Round half to even at this type's precision, once, from the exact value."""
+        if value == 0:
+            return value
+        magnitude = abs(value)
+        exponent = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
+        while Fraction(2) ** exponent > magnitude:
+            exponent -= 1
+        while Fraction(2) ** (exponent + 1) <= magnitude:
+            exponent += 1
+        unit = Fraction(2) ** max(exponent - self._mantissa + 1, self._smallest)
+        rounded = round(magnitude / unit) * unit
+        return rounded if value > 0 else -rounded
+
+    def literal(self, value: Fraction) -> str:
+        number = self.dtype(float(self.nearest(value)))
+        if not np.isfinite(number):
+            raise OverflowError(f"{float(value):g} does not fit a {self.name}")
+        text = np.format_float_scientific(number, unique=True, trim="-")
+        mantissa, exponent = text.split("e")
+        if -5 <= int(exponent) < 8:
+            text = np.format_float_positional(number, unique=True, trim="0")
+        else:
+            text = f"{mantissa if '.' in mantissa else mantissa + '.0'}e{int(exponent)}"
+        return text + self.suffix
+
+    def function(self, op: str) -> str:
+        if op == "abs":
+            return "fabs" + self.suffix
+        if op in _LIBM or op == "ceil":
+            return op + self.suffix
+        raise KeyError(op)
+
+    @staticmethod
+    def nearest_integer(value: int) -> Fraction:
+        return Fraction(value)
+
+    def convert(self, value: Any) -> Any:
+        if isinstance(value, Fraction):
+            value = float(self.nearest(value))
+        return self.dtype(value)
+
+    def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
+        if op == "sum":
+            return self._sum(data, args)
+        with np.errstate(all="ignore"):
+            return _OPERATIONS[op](self, data, *args)
+
+    def _sum(self, pattern: tuple[tuple[int, int], ...], factors: list[Any]) -> Any:
+        """Left to right, each product and each sum rounded, as C does without contraction."""
+        total: Any = None
+        position = 0
+        with np.errstate(all="ignore"):
+            for sign, count in pattern:
+                term = factors[position]
+                if total is None and sign < 0:
+                    term = -term
+                if count == 2:
+                    term = term * factors[position + 1]
+                position += count
+                total = term if total is None else total + term if sign > 0 else total - term
+        return total
+
+
+def _libm(op: str) -> Callable[..., Any]:
+    name = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"}.get(op, op)
+
+    def call(scalar: Floating, data: Any, *args: Any) -> Any:
+        return scalar.dtype(getattr(np, name)(*args))
+
+    return call
+
+
+def _wrap(s: Floating, period: Fraction, a: Any) -> Any:
+    half = s.convert(period / 2)
+    whole = half + half
+    if a > half or a <= -half:
+        a = a - whole * np.ceil((a - half) / whole)
+        if a > half or a <= -half:
+            a = half
+    return a
+
+
+def _table(s: Floating, table: Any, a: Any) -> Any:
+    xs = [s.convert(v) for v in table.x]
+    ys = [s.convert(v) for v in table.y]
+    i = 0
+    while i + 2 < len(xs) and a >= xs[i + 1]:
+        i += 1
+    r = ys[i] + (a - xs[i]) * s.convert(slopes(table)[i])
+    if a <= xs[0]:
+        r = ys[0]
+    if a >= xs[-1]:
+        r = ys[-1]
+    return r
+
+
+def _slope(s: Floating, table: Any, a: Any) -> Any:
+    xs = [s.convert(v) for v in table.x]
+    i = 0
+    while i + 2 < len(xs) and a >= xs[i + 1]:
+        i += 1
+    return s.convert(slopes(table)[i] if xs[0] <= a < xs[-1] else 0)
+
+
+def slopes(table: Any) -> list[Fraction]:
+    """The slope of each segment of a table."""
+    pairs = list(zip(table.x, table.y, strict=True))
+    return [(y1 - y0) / (x1 - x0) for (x0, y0), (x1, y1) in zip(pairs, pairs[1:], strict=False)]
+
+
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    **{op: _libm(op) for op in _LIBM},
+    "add": lambda s, d, a, b: a + b,
+    "sub": lambda s, d, a, b: a - b,
+    "mul": lambda s, d, a, b: a * b,
+    "div": lambda s, d, a, b: a / b,
+    "neg": lambda s, d, a: -a,
+    "abs": lambda s, d, a: abs(a),
+    "hypot": lambda s, d, *a: np.sqrt(s._sum(tuple((1, 2) for _ in a), [v for v in a for _ in (0, 1)])),
+    "min": lambda s, d, a, b: b if b < a else a,
+    "max": lambda s, d, a, b: b if b > a else a,
+    "sign": lambda s, d, a: s.dtype((a > 0) * 1 - (a < 0) * 1),
+    "wrap": _wrap,
+    "table": _table,
+    "slope": _slope,
+    "finite": lambda s, d, a: bool(a - a >= 0),
+    "lt": lambda s, d, a, b: bool(a < b),
+    "le": lambda s, d, a, b: bool(a <= b),
+    "and": lambda s, d, a, b: a and b,
+    "or": lambda s, d, a, b: a or b,
+    "not": lambda s, d, a: not a,
+    "select": lambda s, d, c, a, b: a if c else b,
+}
+
+FLOAT = Floating("float", np.float32, "f")
+DOUBLE = Floating("double", np.float64, "")
+

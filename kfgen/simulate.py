@@ -1,0 +1,256 @@
+"""Logs drawn from a spec's own model.
+
+The truth starts at a draw from N(x0, P0) and is stepped by f with drawn noise; sensors see h of it with drawn
+noise. The model is evaluated by the reference, never by generated code.
+
+* Noise inputs are drawn with their covariance and go through f (and h). The additive Q, and densities, are
+  drawn with their covariance along the track. R likewise. Semidefinite covariances are fine.
+* Inputs are smooth: three sines with periods of 25 to 250 steps, within a quarter of the half-width of the
+  input's range around its middle; without a range around 0 with an amplitude of at most 1.
+* Fixed dt: row k is the time (k + 1) dt, after that row's predict. Run-time dt: the first row is t = 0,
+  without a step; the steps are the nominal one with up to 10 % of jitter, within [min, max].
+* An imm switches modes by its transition matrix, row by row, from a mode drawn with mu0.
+* The truth of a state with bounds is clipped to them; angles and measured angles are wrapped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kfgen.errors import KfgenError
+from kfgen.logs import Log
+from kfgen.reference.dual import value_of
+from kfgen.reference.linalg import udu
+from kfgen.reference.model import Context, Model, fixed_step, wrap
+from kfgen.reference.process import Process
+from kfgen.reference.sensor import Reading, SensorModel
+from kfgen.reference.status import StepError
+from kfgen.spec.tree import Expression, Number
+from kfgen.spec.types import Matrix, Noise, Sensor, Spec
+
+Array = NDArray[np.float64]
+
+STEPS = 500
+JITTER = 0.1
+
+
+def simulate(
+    spec: Spec,
+    steps: int = STEPS,
+    seed: int = 0,
+    every: Mapping[str, int] | None = None,
+    gaps: float = 0.0,
+) -> Log:
+    """A log of `steps` rows, the truth in columns `true.<state>`; the same for the same seed.
+
+    every: sensor -> it measures in each so many-th row only (default 1). gaps: the share of readings that are
+    lost at random. Raises KfgenError where the model leaves the finite numbers, or a covariance is none.
+    """
+    if steps < 1:
+        raise KfgenError(f"a log needs at least one step, not {steps}")
+    unknown = sorted(set(every or ()) - {sensor.name for sensor in spec.measurements})
+    if unknown:
+        known = ", ".join(sensor.name for sensor in spec.measurements)
+        raise KfgenError(f"unknown sensor `{unknown[0]}` (known: {known})")
+    random = np.random.default_rng(seed)
+    try:
+        with np.errstate(all="ignore"):
+            return _simulate(spec, steps, random, every or {}, gaps)
+    except StepError as error:
+        reason = error.status.name or "an error"
+        raise KfgenError(
+            f"{spec.name}: the model met {reason} on its own track; try another --seed"
+        ) from None
+
+
+def _simulate(
+    spec: Spec, steps: int, random: np.random.Generator, every: Mapping[str, int], gaps: float
+) -> Log:
+    worlds = [_World(each) for each in _mode_specs(spec)]
+    model = worlds[0].model
+    t, dt = _times(spec, model, steps, random)
+    u = _inputs(spec, model, steps, random)
+    modes = _mode_track(spec, model, steps, random)
+    x = worlds[modes[0]].initial(random)
+    run_time = spec.dt is not None and spec.dt.run_time
+    truth = np.empty((steps, model.n))
+    readings = {sensor.name: np.full((steps, len(sensor.components)), np.nan) for sensor in spec.measurements}
+    now = 0.0
+    for k in range(steps):
+        world = worlds[modes[k]]
+        if k > 0 or not run_time:
+            x = world.step(x, Context(model.values, u[k], now, float(dt[k])), random)
+            now = float(t[k])
+        truth[k] = x
+        context = Context(model.values, u[k], now, 0.0)
+        for name, column in readings.items():
+            z = world.measure(name, x, context, random)
+            lost = gaps > 0 and random.random() < gaps
+            if k % every.get(name, 1) == 0 and not lost:
+                column[k] = z
+    columns = {"t": t, **{each.name: u[:, i] for i, each in enumerate(spec.inputs)}}
+    for sensor in spec.measurements:
+        for i, component in enumerate(sensor.components):
+            columns[f"{sensor.name}.{component.name}"] = readings[sensor.name][:, i]
+    columns |= {f"true.{name}": truth[:, i] for i, name in enumerate(model.states)}
+    return Log(columns, steps, "<simulated>")
+
+
+@dataclass(frozen=True)
+class _Meter:
+    """A sensor as it measures: its model, its additive noise alone, its noise inputs."""
+
+    spec: Sensor
+    model: SensorModel
+    additive: SensorModel
+
+
+class _World:
+    """The model of a spec (or of a mode) that draws its noises."""
+
+    def __init__(self, spec: Spec) -> None:
+        self.spec = spec
+        self.model = Model(spec)
+        self._process = Process(self.model)
+        held = [not noise.density for noise in spec.noise]
+        self._held = np.flatnonzero(held)
+        self._noise = self.model.noise_covariance(spec.noise, spec.noise_covariance)
+        # with the noises per step silenced, what linearise gives for Q is all that acts additively
+        silent, covariance = _silenced(spec.noise, spec.noise_covariance, held)
+        self._additive = Process(Model(replace(spec, noise=silent, noise_covariance=covariance)))
+        self._meters = {sensor.name: self._meter(sensor) for sensor in spec.measurements}
+
+    def _meter(self, sensor: Sensor) -> _Meter:
+        silent, covariance = _silenced(sensor.noise, sensor.noise_covariance, [True] * len(sensor.noise))
+        quiet = replace(sensor, noise=silent, noise_covariance=covariance)
+        return _Meter(sensor, SensorModel(self.model, sensor), SensorModel(self.model, quiet))
+
+    def initial(self, random: np.random.Generator) -> Array:
+        """A draw of the first state [n]."""
+        model = self.model
+        return self._placed(model.x0 + _draw(model.P0, random))
+
+    def step(self, x: Array, context: Context, random: np.random.Generator) -> Array:
+        """The state [n] after a step with drawn noise."""
+        Qw = self._noise(self.model.environment(context, x))[np.ix_(self._held, self._held)]
+        after = self._process.advance(x, _draw(Qw, random), context)
+        after = after + _draw(self._additive.linearise(x, context).Q, random)
+        if not np.all(np.isfinite(after)):
+            raise KfgenError(
+                f"{self.spec.name}: the simulated state left the finite numbers; try another --seed"
+            )
+        return self._placed(after)
+
+    def measure(self, name: str, x: Array, context: Context, random: np.random.Generator) -> Array:
+        """A drawn reading [m] of a sensor at the state x [n]."""
+        meter = self._meters[name]
+        used = tuple(range(meter.model.m))
+        noise = self.model.noise_covariance(meter.spec.noise, meter.spec.noise_covariance)
+        e = _draw(noise(self.model.environment(context, x)), random)
+        z = np.array([value_of(h) for h in meter.model.predict(list(x), list(e), context, used)])
+        R = meter.additive.linearise(x, Reading(meter.additive, z, used, context)).R
+        z = z + _draw(R, random)
+        for i, component in enumerate(meter.spec.components):
+            if component.period is not None:
+                z[i] = wrap(float(z[i]), self.model.number(component.period))
+        return z
+
+    def _placed(self, x: Array) -> Array:
+        return self.model.wrap(self.model.clip(x))
+
+
+def _draw(P: Array, random: np.random.Generator) -> Array:
+    """A draw from N(0, P); as many random numbers are used whatever P is, so that tracks stay comparable."""
+    n = len(P)
+    numbers = random.standard_normal(n)
+    U, D = udu(P)
+    drawn: Array = U @ (np.sqrt(np.maximum(D, 0.0)) * numbers)
+    return drawn
+
+
+def _silenced(
+    noise: tuple[Noise, ...], covariance: Matrix | None, which: list[bool]
+) -> tuple[tuple[Noise, ...], Matrix | None]:
+    """Noise inputs with those in `which` at variance 0."""
+    if covariance is None:
+        silent = (replace(n, variance=_zero(n)) if off else n for n, off in zip(noise, which, strict=True))
+        return tuple(silent), None
+    rows = tuple(
+        tuple(
+            replace(entry, tree=Number(Fraction(0))) if which[i] or which[j] else entry
+            for j, entry in enumerate(row)
+        )
+        for i, row in enumerate(covariance)
+    )
+    return noise, rows
+
+
+def _zero(noise: Noise) -> Expression:
+    return Expression(Number(Fraction(0)), "0", noise.place)
+
+
+def _times(spec: Spec, model: Model, steps: int, random: np.random.Generator) -> tuple[Array, Array]:
+    """t [steps] of the rows and the step dt [steps] that leads to each."""
+    if spec.dt is None:
+        return np.arange(1.0, steps + 1), np.ones(steps)
+    fixed = fixed_step(spec)
+    if fixed is not None:
+        t = np.array([float((k + 1) * fixed) for k in range(steps)])
+        return t, np.full(steps, float(fixed))
+    nominal = model.number(spec.dt.nominal)
+    drawn = nominal * (1 + JITTER * random.uniform(-1, 1, steps))
+    low = -math.inf if spec.dt.minimum is None else model.number(spec.dt.minimum)
+    high = math.inf if spec.dt.maximum is None else model.number(spec.dt.maximum)
+    # a log's times are short decimals; what counts is the difference of the times as written
+    digits = max(0, 4 - math.floor(math.log10(nominal)))
+    t = np.round(np.concatenate([[0.0], np.cumsum(np.clip(drawn, low, high)[1:])]), digits)
+    return t, np.diff(t, prepend=0.0)
+
+
+def _inputs(spec: Spec, model: Model, steps: int, random: np.random.Generator) -> Array:
+    """Smooth inputs [steps, inputs]."""
+    u = np.empty((steps, len(spec.inputs)))
+    k = np.arange(steps)
+    for i, each in enumerate(spec.inputs):
+        middle, amplitude = 0.0, 1.0
+        if each.range is not None:
+            low, high = (model.number(limit) for limit in each.range)
+            middle, amplitude = (low + high) / 2, (high - low) / 8
+        periods = 25 * 10 ** random.uniform(0, 1, 3)
+        phases = random.uniform(0, 2 * math.pi, 3)
+        waves = np.sin(2 * math.pi * k[:, None] / periods + phases)
+        u[:, i] = middle + amplitude * waves.mean(axis=1)
+    return u
+
+
+def _mode_specs(spec: Spec) -> list[Spec]:
+    """The spec itself, or each mode of an imm as a spec of its own."""
+    if spec.imm is None:
+        return [spec]
+    return [
+        replace(
+            spec, imm=None, states=mode.states, covariances=mode.covariances, P0=mode.P0, noise=mode.noise,
+            noise_covariance=mode.noise_covariance, let=mode.let, dynamics=mode.dynamics,
+            measurements=mode.measurements, filter=mode.filter,
+        )
+        for mode in spec.imm.modes
+    ]  # fmt: skip
+
+
+def _mode_track(spec: Spec, model: Model, steps: int, random: np.random.Generator) -> list[int]:
+    """The mode in each row."""
+    if spec.imm is None:
+        return [0] * steps
+    M = np.array([[model.number(entry) for entry in row] for row in spec.imm.transition])
+    mu = np.array([model.number(entry) for entry in spec.imm.mu0])
+    track = [int(random.choice(len(mu), p=mu / mu.sum()))]
+    while len(track) < steps:
+        row = M[track[-1]]
+        track.append(int(random.choice(len(mu), p=row / row.sum())))
+    return track

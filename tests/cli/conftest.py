@@ -1,0 +1,78 @@
+"""The commands, run in-process on the hand-written filter of tests/native in place of generated code."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from click.testing import CliRunner, Result
+
+from kfgen.cli import cli
+from kfgen.spec.types import Spec
+
+NATIVE = Path(__file__).parent.parent / "native"
+
+
+@dataclass
+class Summary:
+    rows: list[tuple[str, dict[str, int]]] = field(
+        default_factory=lambda: [
+            ("predict", {"mul": 31, "add": 27, "sin": 1}),
+            ("update_gnss", {"div": 2, "sqrt": 0}),
+        ]
+    )
+    ram: int = 48
+    notes: list[str] = field(default_factory=lambda: ["states are kept in the order px, py, th"])
+
+
+@dataclass
+class Generated:
+    files: dict[str, str]
+    summary: Summary = field(default_factory=Summary)
+
+
+def generate(spec: Spec) -> dict[str, str]:
+    texts = {ending: (NATIVE / f"vehicle_small.{ending}").read_text() for ending in ("h", "c")}
+    return {
+        f"{spec.name}.{ending}": text.replace("vehicle_small", spec.name)
+        .replace("VEHICLE_SMALL", spec.name.upper())
+        .replace("float ", f"{spec.scalar} ")
+        for ending, text in texts.items()
+    }
+
+
+@pytest.fixture(autouse=True)
+def _generator(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
+    module = ModuleType("kfgen.generate")
+    module.generate = generate  # type: ignore[attr-defined]
+    module.build = lambda spec: Generated(generate(spec))  # type: ignore[attr-defined]
+    module.Generated = Generated  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "kfgen.generate", module)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp().parent / "kfgen-test-cache"))
+    monkeypatch.setenv("COLUMNS", "100")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working directory, with `vehicle_small.yaml` in it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "vehicle_small.yaml").write_text((NATIVE / "vehicle_small.yaml").read_text())
+    return tmp_path
+
+
+@pytest.fixture
+def kfgen(folder: Path) -> Callable[..., Result]:
+    """Calls `kfgen ARGUMENTS` in that directory; an exception that gets out fails the test."""
+
+    def call(*arguments: str) -> Result:
+        result = CliRunner().invoke(cli, list(arguments), prog_name="kfgen")
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        assert "Traceback" not in result.output
+        return result
+
+    return call

@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from kfgen.commands.build import aligned
+
+SPEC = "vehicle_small.yaml"
+
+TABLE = """\
+filter         size         RAM  function     operations             files
+-------------  ----------  ----  -----------  ---------------------  ---------------------------------------
+vehicle_small  3 states    48 B  predict      31 mul, 27 add, 1 sin  generated/vehicle_small/vehicle_small.h
+float          1 input           update_gnss  2 div                  generated/vehicle_small/vehicle_small.c
+               gnss: 2
+               compass: 1
+vehicle_small: states are kept in the order px, py, th
+"""
+
+
+def test_writes_the_files_and_prints_a_table(kfgen, folder):
+    result = kfgen("build", SPEC)
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    written = folder / "generated" / "vehicle_small"
+    assert sorted(path.name for path in written.iterdir()) == ["vehicle_small.c", "vehicle_small.h"]
+    assert result.stdout == TABLE
+
+
+def test_elsewhere_and_with_another_scalar(kfgen, folder):
+    assert kfgen("build", SPEC, "-o", "src/kf", "--scalar", "double").exit_code == 0
+    assert "typedef double" in (folder / "src/kf/vehicle_small/vehicle_small.h").read_text()
+
+
+def test_check_tells_what_differs(kfgen, folder):
+    missing = kfgen("build", "--check", SPEC)
+    assert missing.exit_code == 1
+    assert "--- /dev/null" in missing.stdout
+    assert not (folder / "generated").exists()
+    kfgen("build", SPEC)
+    clean = kfgen("build", "--check", SPEC)
+    assert (clean.exit_code, clean.output) == (0, "")
+    path = folder / "generated/vehicle_small/vehicle_small.c"
+    path.write_text(path.read_text().replace("0.64f", "0.65f"))
+    before = path.read_bytes()
+    changed = kfgen("build", "--check", SPEC)
+    assert changed.exit_code == 1
+    assert "0.65f" in [line for line in changed.stdout.splitlines() if line.startswith("-")][1]
+    assert "0.64f" in [line for line in changed.stdout.splitlines() if line.startswith("+")][1]
+    assert "1 file differs" in changed.stderr
+    assert path.read_bytes() == before
+
+
+def test_check_sees_line_ends(kfgen, folder):
+    kfgen("build", SPEC)
+    path = folder / "generated/vehicle_small/vehicle_small.h"
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    assert kfgen("build", "--check", SPEC).exit_code == 1
+
+
+def test_all_specs_are_checked_before_anything_is_written(kfgen, folder):
+    text = Path(SPEC).read_text()
+    Path("a.yaml").write_text(text.replace("name: vehicle_small", "name: a").replace("std: 0.1", "std: -1"))
+    Path("b.yaml").write_text(text.replace("name: vehicle_small", "name: b").replace("inputs:", "input:"))
+    result = kfgen("build", SPEC, "a.yaml", "b.yaml")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert "a.yaml:" in result.stderr
+    assert "b.yaml:" in result.stderr
+    assert not (folder / "generated").exists()
+
+
+def test_two_of_one_name(kfgen, folder):
+    Path("twin.yaml").write_text(Path(SPEC).read_text())
+    result = kfgen("build", SPEC, "twin.yaml")
+    assert result.exit_code == 2
+    assert "twin.yaml are both named `vehicle_small`" in result.stderr
+    assert not (folder / "generated").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["build"], "Missing argument"),
+        (["build", "nowhere.yaml"], "nowhere.yaml"),
+        (["build", SPEC, "--scalar", "half"], "scalar `half` is unknown"),
+        (["build", SPEC, "--selftest"], "--selftest is not built yet"),
+        (["build", SPEC, "--log", "x.csv"], "--log is not built yet"),
+        (["build", SPEC, "--layout", "x"], "--layout is not built yet"),
+        (["build", SPEC, "-o", "file/below"], "file"),
+        (["build", SPEC, "--nothing"], "No such option"),
+        (["nothing"], "No such command"),
+        (["cost", SPEC], "cost is not built yet"),
+    ],
+)
+def test_wrong_calls_exit_2(kfgen, folder, arguments, text):
+    (folder / "file").write_text("")
+    result = kfgen(*arguments)
+    assert result.exit_code == 2
+    assert text in result.stderr
+    assert result.stdout == ""
+
+
+def test_aligned_columns():
+    assert aligned([("a", "n"), ("long", "5"), ("b", "12")], right=(1,)) == [
+        "a      n",
+        "----  --",
+        "long   5",
+        "b     12",
+    ]
+
+
+def test_warnings_of_a_spec_are_told_but_not_fatal(kfgen, monkeypatch):
+    monkeypatch.setattr("kfgen.spec.warnings", lambda spec: ["file:1:1: odd"])
+    result = kfgen("build", SPEC)
+    assert result.exit_code == 0
+    assert result.stderr == "warning: file:1:1: odd\n"
+
+
+def test_the_language_page(kfgen):
+    result = kfgen("language")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("# ")
+    assert "measurements" in result.stdout

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+from kfgen import logs
+from kfgen.errors import KfgenError
+
+HEAD = "t,gyro,gnss.x,gnss.y,compass.heading\n"
+
+
+@pytest.fixture
+def read(spec, tmp_path):
+    def reading(text):
+        path = tmp_path / "log.csv"
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return logs.read(path, spec)
+
+    return reading
+
+
+def test_columns_in_any_order_with_a_byte_order_mark(read):
+    log = read("\ufeffnote,compass.heading, gnss.y ,gnss.x,gyro,t,true.px\r\nhi,,2, 1.5 ,1e-3,0,9\r\n\r\n")
+    assert log.rows == 1
+    assert log.columns["gnss.x"] == [1.5]
+    assert log.columns["gyro"] == [0.001]
+    assert np.isnan(log.columns["compass.heading"]).all()
+    assert log.columns["true.px"] == [9]
+    assert log.ignored == ("note",)
+
+
+def test_nan_is_an_empty_cell_and_inf_a_value(read):
+    log = read(HEAD + "0,0,nan,NaN,-inf\n")
+    assert np.isnan(log.columns["gnss.x"]).all()
+    assert log.columns["compass.heading"] == [-np.inf]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"log is empty"),
+        ("\n1,2\n", r"log is empty"),
+        (HEAD, r"header but no rows"),
+        ("t,gyro,gnss.x,gnss.y\n0,0,0,0\n", r"column `compass\.heading` is missing .*the log has: t, gyro"),
+        (HEAD.replace("gyro", "giro") + "0,0,0,0,0\n", r"column `gyro` is missing; did you mean `giro`"),
+        (HEAD.replace(",", ";") + "0;0;0;0;0\n", r"separated by commas"),
+        (HEAD.replace("gyro", "t") + "0,0,0,0,0\n", r"column `t` occurs twice"),
+        (HEAD + "0,0,0,0,0\n1,0,abc,0,0\n", r"log\.csv:3: column `gnss\.x`: 'abc' is not a number"),
+        (HEAD + "0,1_000,0,0,0\n", r"log\.csv:2: column `gyro`: '1_000' is not a number"),
+        (HEAD + "0,0x10,0,0,0\n", r"is not a number"),
+        (HEAD + "0,infinity,0,0,0\n", r"is not a number"),
+        (HEAD + "0,e,0,0,0\n", r"is not a number"),
+        (HEAD + "0,0,0\n", r"log\.csv:2: 3 cells, but the header has 5"),
+        (HEAD + "0,0,0,0,0\n,0,0,0,0\n", r"log\.csv:3: column `t`: the time is empty or not finite"),
+        (HEAD + "inf,0,0,0,0\n", r"the time is empty or not finite"),
+        (HEAD + '0,"0,0,0,0\n', r"not a CSV file"),
+        (b"\x89PNG\r\n\x1a\n\xff\xfe\x00", r"not a CSV file"),
+        (HEAD.encode() + b"0,0,\x00,0,0\n", r"log\.csv:2: .*"),
+    ],
+)
+def test_what_is_wrong_with_a_log(read, text, message):
+    with pytest.raises(KfgenError, match=message):
+        read(text)
+
+
+def test_columns_in_memory(spec):
+    columns = {name: [0.0, 1.0] for name in HEAD.strip().split(",")}
+    assert logs.as_log(columns, spec).rows == 2
+    with pytest.raises(ValueError, match="one length"):
+        logs.as_log({**columns, "t": [0.0]}, spec)
+
+
+def test_numbers_are_written_as_short_as_they_read_back(tmp_path):
+    columns = {
+        "a": np.array([0.1, 1 / 3, np.nan, -0.0]),
+        "b": np.array([0.1, 1 / 3, 1e-30, np.inf], dtype=np.float32),
+        "c": np.array([0, 16, 256, 2**32 - 1], dtype=np.uint32),
+    }
+    stream = io.BytesIO()
+    logs.write_to(stream, columns)
+    lines = stream.getvalue().decode().splitlines()
+    assert lines == [
+        "a,b,c",
+        "0.1,0.1,0",
+        "0.3333333333333333,0.33333334,16",
+        ",1e-30,256",
+        "-0.0,inf,4294967295",
+    ]
+    logs.write(tmp_path / "deep" / "out.csv", columns)
+    assert (tmp_path / "deep" / "out.csv").read_bytes() == stream.getvalue()

@@ -1,0 +1,66 @@
+"""Names that would break the emitted code are refused, and no others."""
+
+from __future__ import annotations
+
+import pytest
+
+from kfgen.spec import loads
+from kfgen.spec.names import identifiers, is_scalar, wrong_name
+from kfgen.spec.reference import markdown
+from kfgen.spec.reserved import reserved
+from kfgen.spec.schema import RECORDS
+
+BASE = "kfgen: 1\nname: car\nscalar: q16.16\nstates: {x: {init: 0, std: 1}}\ndynamics: {}\n"
+BASE += (
+    "measurements: {gps: {partial: true, z: {east: {h: x, std: 1}}}}\nparameters: {p: 1}\ninputs: {u: {}}\n"
+)
+
+
+@pytest.mark.parametrize(
+    "name",
+    """
+    int restrict class co_await lambda None sin where pi e t dt NULL INFINITY NAN M_PI EOF errno
+    true bool I complex INT32_MAX FLT_EPSILON linux PI HALF_PI TWO_PI DEG_TO_RAD F HIGH LOW INPUT
+    OUTPUT B0 B1 B01 B11111111 A0 A15 bit word byte boolean round sq constrain radians degrees cli
+    sei interrupts PORTB PB3 SREG TCNT1 isnan and or not
+    """.split(),
+)
+def test_reserved(name: str) -> None:
+    assert reserved(name)
+    assert wrong_name(name)
+
+
+@pytest.mark.parametrize(
+    "name", "x px th v_x B2 B010101010 A P Q R D U S h z omega lambda_ y1 gamma beta PX1 i".split()
+)
+def test_free(name: str) -> None:
+    assert wrong_name(name) is None
+
+
+@pytest.mark.parametrize("name", ["", "_x", "1x", "a b", "ä", "x" * 41, "a-b", "x\n"])
+def test_malformed(name: str) -> None:
+    assert wrong_name(name)
+
+
+def test_scalars() -> None:
+    good = ["float", "double", *(f"q{32 - n}.{n}" for n in range(8, 25))]
+    assert all(is_scalar(text) for text in good)
+    bad = ["", "Float", "q16", "q16.16 ", "q0.32", "q25.7", "q7.25", "q16.15", "q016.16", "Q16.16", "int"]
+    assert not any(is_scalar(text) for text in bad)
+
+
+def test_identifiers_are_those_of_the_emitted_code() -> None:
+    found = {name for name, _, _ in identifiers(loads(BASE))}
+    assert found >= {
+        "CAR_NX", "CAR_NU", "CAR_NZ_GPS", "CAR_X", "CAR_OK", "CAR_NOT_POSITIVE", "car_t", "car_real_t", "car_inputs_t",
+        "car_gps_t", "car_parameters_t", "car_status_t", "car_init", "car_predict", "car_update_gps",
+        "car_update_gps_masked", "car_set_state", "car_set_covariance", "car_get_covariance", "CAR_FRACTION_BITS",
+        "CAR_X_LSB", "CAR_X_FROM", "CAR_X_TO", "CAR_U_LSB", "CAR_GPS_EAST_LSB", "CAR_P_LSB",
+    }  # fmt: skip
+
+
+def test_the_reference_names_every_key() -> None:
+    page = markdown()
+    assert all(f"| `{key.name}` |" in page for record in RECORDS for key in record.keys)
+    assert page == markdown()
+    assert "None" not in page
