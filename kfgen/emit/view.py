@@ -146,13 +146,15 @@ class _ViewMaker:
         functions = tuple(self.function(f) for f in code.functions)
         text = "\n".join(line for f in functions for line in f.body)
         names = [s.name for s in spec.states]
+        description = [line for part in spec.description.strip().split("\n") for line in _fill(_safe(part), WIDTH - 4)]
+        description = description if any(description) else []
         return View(
             name=self.name,
             NAME=self.NAME,
-            guard=f"{self.NAME}_H",
+            guard=f"{self.NAME}_H_INCLUDED",
             command=f"{self.name}.yaml" + (f" --scalar {scalar.name}" if self.overridden else ""),
-            title=code.description if not spec.description else spec.description.strip().split("\n")[0],
-            description=tuple(spec.description.strip().split("\n")[1:]),
+            title=description[0] if description else code.description,
+            description=tuple(description[1:]),
             filter=code.description,
             version=package_version(),
             sympy=sympy.__version__,
@@ -166,8 +168,8 @@ class _ViewMaker:
                 Named(s.name, _about(s.unit, s.doc), index_name=f"{self.NAME}_{s.name.upper()}") for s in spec.states
             ], "index_name", 1),
             state_table=tuple(_columns([
-                [s.name, f"[{s.unit}]" if s.unit else "", {"real": "", "angle": "angle", "periodic": "periodic"}[s.kind],
-                 " ".join(s.doc.split())]
+                [s.name, f"[{_safe(s.unit)}]" if s.unit else "", {"real": "", "angle": "angle", "periodic": "periodic"}[s.kind],
+                 _safe(" ".join(s.doc.split()))]
                 for s in spec.states
             ])),
             reference=tuple(self.reference(names)),
@@ -339,11 +341,18 @@ def _signature(head: str, arguments: list[str]) -> list[str]:
     return [*out, pad + arguments[-1] + ")"]
 
 
+def _safe(text: str) -> str:
+    """Free text of the spec, unable to end a comment or to start a trigraph."""
+    return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
+
+
 def _about(unit: str, doc: str) -> str:
+    unit, doc = _safe(unit), _safe(doc)
     return " ".join(part for part in (f"[{unit}]" if unit else "", " ".join(doc.split())) if part)
 
 
 def _with_unit(name: str, unit: str) -> str:
+    unit = _safe(unit)
     return f"{name} [{unit}]" if unit else name
 
 

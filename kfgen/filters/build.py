@@ -37,8 +37,9 @@ def build_filter(spec: Spec, epsilon: Fraction, taken: frozenset[str]) -> Filter
     n = len(model.states)
     update = spec.filter.update
     assert update is not None
-    layout: Any = UD(n, update) if spec.filter.covariance == "ud" else Full(n, update, epsilon)
-    order = _order(model) if layout.reorders else list(range(n))
+    best = _order(model)
+    layout: Any = UD(n, update) if spec.filter.covariance == "ud" else Full(n, update, epsilon, best)
+    order = best if layout.reorders else list(range(n))
     code = Ekf(model, layout, order, epsilon).code(taken)
     return _with_tables(code)
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.base import Block
-from kfgen.filters.linalg import Rows, Vector
+from kfgen.filters.linalg import Rows, Symmetric, Vector
 from kfgen.filters.numbers import is_positive, is_zero, select, sqrt
 from kfgen.filters.ud import triangle
 from kfgen.ir.trace import Array, Trace, Value
@@ -22,105 +22,100 @@ class Full:
 
     reorders = False
 
-    def __init__(self, n: int, update: str, epsilon: Fraction) -> None:
+    def __init__(self, n: int, update: str, epsilon: Fraction, sequence: list[int]) -> None:
         self.n = n
         self.form = update
         self.epsilon = epsilon
+        # After a prediction the columns are computed and stored in an order that keeps together what the model
+        # couples: few entries of the old P are then still needed when they are overwritten.
+        self.sequence = sequence
 
     def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
         flat = tuple(P0[i][j] for j in range(self.n) for i in range(j + 1))
         return [Block("P", len(flat), "covariance, upper triangle column by column", initial=flat)]
 
-    def load(self, t: Trace) -> Rows:
-        n = self.n
-        return [[t.element("kf.P", packed(min(i, j), max(i, j))) for j in range(n)] for i in range(n)]
+    def load(self, t: Trace) -> Symmetric:
+        return Symmetric(self.n, lambda i, j: t.element("kf.P", packed(i, j)))
 
-    def predict(self, t: Trace, P: Rows, F: Rows, Q: Rows, noise: list[tuple[Vector, Value]]) -> Rows:
-        """P <- F P F^T + Q + sum of d w w^T over the noise columns (w, d)."""
-        t.section("P = F P F^T + Q")
-        out = linalg.triple(F, P)
-        for i in range(self.n):
-            for j in range(i, self.n):
-                if not is_zero(Q[i][j]):
-                    out[i][j] = out[i][j] + Q[i][j]
-                for w, d in noise:
-                    if not is_zero(w[i]) and not is_zero(w[j]):
-                        out[i][j] = out[i][j] + w[i] * d * w[j]
-        return out
+    def predict(self, t: Trace, P: Symmetric, F: Rows, Q: Rows, noise: list[tuple[Vector, Value]]) -> Symmetric:
+        """F P F^T + Q + sum of d w w^T over the noise columns (w, d)."""
+        t.section("P = F P F^T + Q: the diagonal first, for the guards")
 
-    def update(self, t: Trace, P: Rows, rows: Rows, variances: Vector) -> tuple[Rows, Vector]:
-        """Update P in place by scalar measurements; returns the gains (m, n) and innovation variances (m,)."""
+        def with_noise(i: int, j: int, p: Value) -> Value:
+            if not is_zero(Q[i][j]):
+                p = p + Q[i][j]
+            for w, d in noise:
+                if not is_zero(w[i]) and not is_zero(w[j]):
+                    p = p + w[i] * d * w[j]
+            return p
+
+        return P.congruent(F).changed(with_noise)
+
+    def update(self, t: Trace, P: Symmetric, rows: Rows, variances: Vector) -> tuple[Symmetric, Rows, Vector]:
+        """Scalar measurements one after another: P, the gains (m, n) and the innovation variances (m,)."""
         gains, s = [], []
         for h, r in zip(rows, variances, strict=True):
-            c = linalg.column(P, h)
+            c = P.times(h)
             variance = linalg.dot(h, c) + r
             K = linalg.quotients(c, variance, r)
-            if self.form == "joseph":
-                self._joseph(P, h, r, c, K)
-            else:
-                self._subtract(P, K, c)
+            P = P.joseph(h, r, c, K) if self.form == "joseph" else P.downdated(h, r, c, K)
             if not is_positive(r):
-                self._clamp(t, P, K, c)
+                P = self._clamped(t, P, K, c)
             gains.append(K)
             s.append(variance)
-        return gains, s
+        return P, gains, s
 
-    def _subtract(self, P: Rows, K: Vector, c: Vector) -> None:
-        """P - K s K^T, with s K = c."""
-        for i in range(self.n):
-            for j in range(i, self.n):
-                if not is_zero(K[i]) and not is_zero(c[j]):
-                    P[i][j] = P[j][i] = P[i][j] - K[i] * c[j]
-
-    def _joseph(self, P: Rows, h: Vector, r: Value, c: Vector, K: Vector) -> None:
-        """(I - K h) P (I - K h)^T + r K K^T for any gain: A = (I - K h) P, then A - (A h^T - r K) K^T."""
-        n = self.n
-        A = [[P[i][j] if is_zero(K[i]) or is_zero(c[j]) else P[i][j] - K[i] * c[j] for j in range(n)] for i in range(n)]
-        g = [linalg.dot(A[i], h) for i in range(n)]
-        g = [x if is_zero(k) else k * r if is_zero(x) else k * r - x for x, k in zip(g, K, strict=True)]
-        for i in range(n):
-            for j in range(i, n):
-                P[i][j] = P[j][i] = A[i][j] if is_zero(g[i]) or is_zero(K[j]) else A[i][j] + g[i] * K[j]
-
-    def _clamp(self, t: Trace, P: Rows, K: Vector, c: Vector) -> None:
+    def _clamped(self, t: Trace, P: Symmetric, K: Vector, c: Vector) -> Symmetric:
         """A variance that an exact measurement took to zero may come out below it by round-off: back to zero."""
+        low = {}
         for i in range(self.n):
-            if is_zero(K[i]):
-                continue
-            old = P[i][i] + K[i] * c[i]
-            low = (P[i][i] < 0) & (P[i][i] >= -(old * (4 * self.n * self.epsilon)))
-            t.flag(low, "REGULARIZED")
-            P[i][i] = select(low, 0, P[i][i])
+            if not is_zero(K[i]):
+                old = P[i, i] + K[i] * c[i]
+                low[i] = (P[i, i] < 0) & (P[i, i] >= -(old * (4 * self.n * self.epsilon)))
+                t.flag(low[i], "REGULARIZED")
+        return P.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p)
 
-    def tolerance(self, P: Rows, h: Vector) -> Value | int:
+    def tolerance(self, P: Symmetric, h: Vector) -> Value | int:
         """How far below zero h P h^T may come out by round-off."""
-        terms = [(hi * hi * P[i][i]) for i, hi in enumerate(h) if not is_zero(hi)]
+        terms = [(hi * hi * P[i, i]) for i, hi in enumerate(h) if not is_zero(hi)]
         return sum(terms[1:], terms[0]) * (4 * self.n * self.epsilon) if terms else 0
 
-    def limit(self, t: Trace, P: Rows, floors: list[Fraction | None], ceilings: list[Fraction | None]) -> None:
+    def limit(self, t: Trace, P: Symmetric, floors: list[Fraction | None], ceilings: list[Fraction | None]
+              ) -> Symmetric:  # fmt: skip
         """variance_floor raises P_ii; variance_ceiling scales row and column i down."""
-        for i, low in enumerate(floors):
-            if low is not None:
-                t.flag(P[i][i] < low, "REGULARIZED")
-                P[i][i] = select(P[i][i] < low, t.value(low), P[i][i])
-        for i, high in enumerate(ceilings):
-            if high is not None:
-                above = P[i][i] > high
-                t.flag(above, "REGULARIZED")
-                scale = select(above, sqrt(high / P[i][i]), 1)
-                for j in range(self.n):
-                    if j != i:
-                        P[i][j] = P[j][i] = P[i][j] * scale
-                P[i][i] = select(above, t.value(high), P[i][i])
+        low, high, scale = {}, {}, {}
+        for i, floor in enumerate(floors):
+            if floor is not None:
+                low[i] = P[i, i] < floor
+                t.flag(low[i], "REGULARIZED")
+        P = P.changed(lambda i, j, p: select(low[i], floors[i], p) if i == j and i in low else p)
+        for i, ceiling in enumerate(ceilings):
+            if ceiling is not None:
+                high[i] = P[i, i] > ceiling
+                t.flag(high[i], "REGULARIZED")
+                scale[i] = select(high[i], sqrt(ceiling / P[i, i]), 1)
 
-    def evidence(self, P: Rows, after_predict: bool) -> list[Value]:
-        """The diagonal: |P_ij| <= max(P_ii, P_jj), and their products bound those off the diagonal."""
-        return [P[i][i] for i in range(self.n)]
+        def bounded(i: int, j: int, p: Value) -> Value:
+            if i == j:
+                return select(high[i], ceilings[i], p) if i in high else p
+            for k in (i, j):
+                p = p * scale[k] if k in scale else p
+            return p
 
-    def store(self, t: Trace, P: Rows, names: list[str]) -> None:
-        for j in range(self.n):
-            for i in range(j + 1):
-                t.store("kf.P", packed(i, j), t.name(P[i][j], f"p_{names[i]}_{names[j]}"))
+        return P.changed(bounded)
+
+    def evidence(self, P: Symmetric, after_predict: bool) -> list[Value]:
+        """The diagonal: |P_ij| <= max(P_ii, P_jj), and its products bound those off the diagonal.
+
+        A standard update needs none beside x: c_i^2 / s <= P_ii (Cauchy and Schwarz) is finite where P was.
+        """
+        return [P[i, i] for i in range(self.n)] if after_predict or self.form == "joseph" else []
+
+    def store(self, t: Trace, P: Symmetric, names: list[str], after_predict: bool) -> None:
+        for last, j in enumerate(self.sequence if after_predict else range(self.n)):
+            for i in self.sequence[: last + 1] if after_predict else range(j + 1):
+                low, high = min(i, j), max(i, j)
+                t.store("kf.P", packed(low, high), t.name(P[low, high], f"p_{names[low]}_{names[high]}"))
 
     # covariance in and out, as loops -------------------------------------------------------------------
 

@@ -6,6 +6,8 @@ are looked at. Every function is exact in real arithmetic; what is structurally 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from kfgen.filters.numbers import (
     Number, assume_nonnegative, assume_positive, is_one, is_positive, is_zero, select,
 )  # fmt: skip
@@ -121,7 +123,7 @@ def bierman(U: Rows, D: Vector, rows: Rows, variances: Vector) -> tuple[Rows, Ve
                 continue
             b, D[j], s[c] = _gain(D[j], f, s[c])
             steps.append((K[c], f, b))
-        for i in range(j):
+        for i in reversed(range(j)):
             u = column[i]
             for k, f, b in steps:
                 if not is_zero(k[i]):
@@ -200,29 +202,87 @@ def quotients(c: Vector, s: Number, r: Number) -> Vector:
     return [x if is_zero(x) else select(s > 0, x / s, 0) for x in c]
 
 
-def column(P: Rows, h: Vector) -> Vector:
-    """P h^T of a symmetric P, whose upper triangle is read."""
-    n = len(P)
-    return [dot([P[min(i, j)][max(i, j)] for j in range(n)], h) for i in range(n)]
+class Symmetric:
+    """A symmetric matrix whose entries are made when they are first asked for.
 
-
-def triple(F: Rows, P: Rows) -> Rows:
-    """F P F^T of a symmetric P (upper triangle read), upper triangle computed. F: (m, n), P: (n, n).
-
-    The sparser of two rows is the outer factor, and rows of F P are made when they are first needed.
+    What is asked for first is computed first: gains and guards before the bulk, each entry just before its store.
     """
-    m = len(F)
-    weight = [sum(not is_zero(x) for x in row) for row in F]
-    rows: dict[int, Vector] = {}
 
-    def product(i: int) -> Vector:
-        if i not in rows:
-            rows[i] = column(P, F[i])
-        return rows[i]
+    def __init__(self, n: int, entry: Callable[[int, int], Number]) -> None:
+        self.n = n
+        self._entry = entry
+        self._made: dict[tuple[int, int], Number] = {}
 
-    out = zeros(m, m)
-    for i in range(m):
-        for j in range(i, m):
-            outer, inner = (i, j) if weight[i] < weight[j] else (j, i)
-            out[i][j] = dot(F[outer], product(inner))
-    return out
+    def __getitem__(self, ij: tuple[int, int]) -> Number:
+        key = (min(ij), max(ij))
+        if key not in self._made:
+            self._made[key] = self._entry(*key)
+        return self._made[key]
+
+    def times(self, h: Vector) -> Vector:
+        """P h^T."""
+        return [self.dot(i, h) for i in range(self.n)]
+
+    def dot(self, i: int, h: Vector) -> Number:
+        """Row i times h."""
+        return dot([0 if is_zero(hj) else self[i, j] for j, hj in enumerate(h)], h)
+
+    def downdated(self, h: Vector, r: Number, c: Vector, K: Vector) -> Symmetric:
+        """P - K s K^T after a measurement h of variance r. c: P h^T = s K.
+
+        Where h measures a single state, its row is h P' = r K^T: cheaper, and without the difference of nearly
+        equal numbers.
+        """
+        seen = [j for j, x in enumerate(h) if not is_zero(x)]
+        single = seen[0] if len(seen) == 1 else -1
+
+        def entry(i: int, j: int) -> Number:
+            if is_zero(K[i]) or is_zero(c[j]):
+                return self[i, j]
+            if single in (i, j):
+                k = K[j if i == single else i]
+                return r * k if is_one(h[single]) else r / h[single] * k
+            return self[i, j] - K[i] * c[j]
+
+        return Symmetric(self.n, entry)
+
+    def joseph(self, h: Vector, r: Number, c: Vector, K: Vector) -> Symmetric:
+        """(I - K h) P (I - K h)^T + r K K^T for any gain: A = (I - K h) P, then A - (A h^T - r K) K^T.
+
+        c: P h^T.
+        """
+
+        def partial(i: int, j: int) -> Number:
+            return self[i, j] if is_zero(K[i]) or is_zero(c[j]) else self[i, j] - K[i] * c[j]
+
+        rest: Vector = []
+        for i, k in enumerate(K):
+            a = dot([0 if is_zero(hj) else partial(i, j) for j, hj in enumerate(h)], h)
+            rest.append(a if is_zero(k) else k * r if is_zero(a) else k * r - a)
+
+        def entry(i: int, j: int) -> Number:
+            a = partial(i, j)
+            return a if is_zero(rest[i]) or is_zero(K[j]) else a + rest[i] * K[j]
+
+        return Symmetric(self.n, entry)
+
+    def congruent(self, F: Rows) -> Symmetric:
+        """F P F^T. The sparser of two rows is the outer factor."""
+        weight = [sum(not is_zero(x) for x in row) for row in F]
+        made: dict[tuple[int, int], Number] = {}
+
+        def product(i: int, k: int) -> Number:
+            """(F P)_ik."""
+            if (i, k) not in made:
+                made[i, k] = self.dot(k, F[i])
+            return made[i, k]
+
+        def entry(i: int, j: int) -> Number:
+            outer, inner = (i, j) if weight[i] <= weight[j] else (j, i)
+            return dot([0 if is_zero(x) else product(inner, k) for k, x in enumerate(F[outer])], F[outer])
+
+        return Symmetric(len(F), entry)
+
+    def changed(self, change: Callable[[int, int, Number], Number]) -> Symmetric:
+        """Every entry through a function."""
+        return Symmetric(self.n, lambda i, j: change(i, j, self[i, j]))

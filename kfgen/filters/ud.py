@@ -24,8 +24,8 @@ class UD:
     def __init__(self, n: int, update: str) -> None:
         self.n = n
         self.form = update
-        # Elements of U are fetched once for a group of columns; larger groups spill registers.
-        self.group = 4 if n <= 8 else 2
+        # Elements of U are fetched once for a group of columns; the columns have to stay in registers.
+        self.group = max(2, 40 // n)
 
     def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
         n = self.n
@@ -63,16 +63,17 @@ class UD:
             self._absorb(t, U, D, columns + [(w, d, -1) for w, d in noise], "process noise")
             return U, D
         U1, D1 = UQ, DQ
-        columns = [(linalg.unit_columns(F, U, k), D[k], k) for k in range(n)]
         self._absorb(t, U1, D1, [(w, d, -1) for w, d in noise], "process noise")
-        self._absorb(t, U1, D1, columns, "F U D U^T F^T + Q")
+        for k in range(0, n, self.group):
+            part = range(k, min(k + self.group, n))
+            t.section("F U D U^T F^T + Q" + ("" if n <= self.group else f", columns {k} to {part[-1]}"))
+            linalg.rank_one(U1, D1, [(linalg.unit_columns(F, U, c), D[c], c) for c in part])
         return U1, D1
 
     def _absorb(self, t: Trace, U: Rows, D: Vector, columns: list[tuple[Vector, Value, int]], what: str) -> None:
         for k in range(0, len(columns), self.group):
             part = columns[k : k + self.group]
-            last = k + len(part)
-            t.section(what if len(columns) <= self.group else f"{what}: columns {k} to {last - 1}")
+            t.section(what + ("" if len(columns) <= self.group else f", columns {k} to {k + len(part) - 1}"))
             linalg.rank_one(U, D, part)
 
     def _factored_noise(self, t: Trace, Q: Rows) -> tuple[Rows, Vector]:
@@ -91,8 +92,9 @@ class UD:
             t.guard(d < 0, "NOT_POSITIVE", "a noise variance is negative")
             assume_nonnegative(d)
 
-    def update(self, t: Trace, P: tuple[Rows, Vector], rows: Rows, variances: Vector) -> tuple[Rows, Vector]:
-        """Update P in place by scalar measurements; returns the gains (m, n) and innovation variances (m,)."""
+    def update(self, t: Trace, P: tuple[Rows, Vector], rows: Rows, variances: Vector
+               ) -> tuple[tuple[Rows, Vector], Rows, Vector]:  # fmt: skip
+        """Scalar measurements one after another: P, the gains (m, n) and the innovation variances (m,)."""
         U, D = P
         if self.form == "joseph":
             gains, s = [], []
@@ -100,8 +102,9 @@ class UD:
                 K, variance = self._joseph(U, D, h, r)
                 gains.append(K)
                 s.append(variance)
-            return gains, s
-        return linalg.bierman(U, D, rows, variances)
+            return P, gains, s
+        gains, s = linalg.bierman(U, D, rows, variances)
+        return P, gains, s
 
     def _joseph(self, U: Rows, D: Vector, h: Vector, r: Value) -> tuple[Vector, Value]:
         """(I - K h) P (I - K h)^T + r K K^T by weighted Gram-Schmidt of [(K h - I) U | K], weights [D, r]."""
@@ -123,7 +126,7 @@ class UD:
         return K, s
 
     def limit(self, t: Trace, P: tuple[Rows, Vector], floors: list[Fraction | None], ceilings: list[Fraction | None]
-              ) -> None:  # fmt: skip
+              ) -> tuple[Rows, Vector]:  # fmt: skip
         """variance_floor and variance_ceiling, on D."""
         _, D = P
         for j, (low, high) in enumerate(zip(floors, ceilings, strict=True)):
@@ -133,6 +136,7 @@ class UD:
             if high is not None:
                 t.flag(D[j] > high, "REGULARIZED")
                 D[j] = select(D[j] > high, t.value(high), D[j])
+        return P
 
     def evidence(self, P: tuple[Rows, Vector], after_predict: bool) -> list[Value]:
         """Values whose finiteness shows that of all of P.
@@ -142,7 +146,7 @@ class UD:
         """
         return list(P[1]) if after_predict or self.form == "joseph" else []
 
-    def store(self, t: Trace, P: tuple[Rows, Vector], names: list[str]) -> None:
+    def store(self, t: Trace, P: tuple[Rows, Vector], names: list[str], after_predict: bool) -> None:
         U, D = P
         for j in range(self.n):
             for i in range(j):

@@ -43,6 +43,7 @@ class _Scheduler:
         self.fused: dict[Node, Node] = {}
         self.local: dict[Node, Node] = {}
         self.temporaries = 0
+        self.kept: set[Node] = set()
 
     def run(self) -> list[Statement]:
         self._count(self.trace.block)
@@ -78,7 +79,7 @@ class _Scheduler:
         """Whether a node becomes a local."""
         if node.op in ("const", "counter"):
             return False
-        if node in self.trace.names:
+        if node in self.trace.names or node in self.kept:
             return True
         if node.op in ("field", "element", "read"):
             return False
@@ -154,6 +155,7 @@ class _Scheduler:
     # statements --------------------------------------------------------------------------------------
 
     def _block(self, block: Block) -> list[Statement]:
+        self._snapshots(block)
         lets = self._forced_lets(block)
         out: list[Statement] = []
         for item in block.items:
@@ -163,6 +165,28 @@ class _Scheduler:
                 continue
             out.append(self._statement(item))
         return _without_empty_sections(out)
+
+    def _snapshots(self, block: Block) -> None:
+        """Fields that are read after they have been stored are kept in a local from before."""
+        stored: set[tuple[str, int | None]] = set()
+        for item in block.items:
+            if isinstance(item, Node):
+                if not (self.uses[item] and self._shared(item)):
+                    continue
+                reads = list(item.args)
+            else:
+                reads = roots(item)
+            while reads and stored:
+                node = reads.pop()
+                if node in self.kept or (self._shared(node) and node.op not in ("field", "element")):
+                    continue
+                if node.op == "element" and (node.data, node.args[0].constant) in stored:
+                    self.kept.add(node)
+                elif node.op == "field" and (node.data, None) in stored:
+                    self.kept.add(node)
+                reads.extend(node.args)
+            if isinstance(item, Store):
+                stored.add((item.name, None if item.index is None else item.index.constant))
 
     def _forced_lets(self, block: Block) -> set[Node]:
         """Single-use values that read memory which is written between their making and their use."""

@@ -102,7 +102,7 @@ class Trace:
         self.block = Block()
         self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body
         self.names: dict[Node, str] = {}
-        self.flags: list[tuple[Node, str]] = []
+
         self.zero = self.wrapped(self.pool.zero)
         self.one = self.wrapped(self.pool.one)
 

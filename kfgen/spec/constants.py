@@ -47,8 +47,11 @@ class NoValue(KfgenError):  # noqa: N818
 def value(tree: Tree, environment: Spec | Mapping[str, Value] | None = None) -> Value:
     """The value of a tree in which every name is constant; NotConstant or NoValue where there is none."""
     names = environment_of(environment) if isinstance(environment, Spec) else environment or {}
-    with mpmath.workdps(DIGITS):
-        return _value(tree, names)
+    try:
+        with mpmath.workdps(DIGITS):
+            return _value(tree, names)
+    except ArithmeticError:  # the operations look after themselves; this is for what mpmath may still refuse
+        raise NoValue("the expression has no finite real value", "correct it") from None
 
 
 evaluate = value
@@ -57,14 +60,19 @@ evaluate = value
 def environment_of(spec: Spec, folded: bool = True) -> dict[str, Value]:
     """The values of a spec's constants and fixed dt; with `folded` also of its parameters."""
     known: dict[str, Value] = {}
-    for name, expression in [(c.name, c.value) for c in spec.constants]:
-        keep(known, name, expression.tree)
-    own: dict[str, Value] = {}
+    for constant in spec.constants:
+        keep(known, constant.name, constant.value.tree)
     if spec.dt is not None and not spec.dt.run_time:
-        keep(own, "dt", spec.dt.nominal.tree, known)
-    for parameter in spec.parameters if folded else ():
-        keep(own, parameter.name, parameter.value.tree, known)
-    return known | own
+        keep(known, "dt", spec.dt.nominal.tree)
+    return with_parameters(spec, known) if folded else known
+
+
+def with_parameters(spec: Spec, known: Mapping[str, Value]) -> dict[str, Value]:
+    """Beside what is known, the spec values of the parameters."""
+    found = dict(known)
+    for parameter in spec.parameters:
+        keep(found, parameter.name, parameter.value.tree, known)
+    return found
 
 
 def keep(known: dict[str, Value], name: str, tree: Tree, using: Mapping[str, Value] | None = None) -> None:

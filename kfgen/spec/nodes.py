@@ -99,3 +99,22 @@ def kind_of(node: Node) -> str:
         words = {"null": "nothing", "boolean": "a boolean", "number": "a number", "text": "text"}
         return words[node.kind]
     return "something else"
+
+
+def columns_of(raw: str, value: str, style: str | None, column: int) -> tuple[int, ...] | None:
+    """The column of each character of a scalar that stands on one line (None: not known)."""
+    if "\n" in raw or "\r" in raw:
+        return None
+    if not style:
+        return tuple(range(column, column + len(value) + 1)) if raw.startswith(value) else None
+    if style == '"' and "\\" not in raw:
+        return tuple(range(column + 1, column + len(value) + 2)) if raw[1:-1] == value else None
+    if style != "'":
+        return None
+    columns: list[int] = []
+    i = 1
+    while i < len(raw) - 1:
+        columns.append(column + i)
+        i += 2 if raw[i : i + 2] == "''" else 1
+    columns.append(column + i)
+    return tuple(columns) if len(columns) == len(value) + 1 else None

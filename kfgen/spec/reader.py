@@ -15,13 +15,14 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
 from kfgen.errors import SpecError
-from kfgen.spec.nodes import Bad, Mapping, Node, Scalar, Sequence, refused
+from kfgen.spec.nodes import Bad, Mapping, Node, Scalar, Sequence, columns_of, refused
 from kfgen.spec.problems import Problems, short
 
 MAX_BYTES = 1_000_000
 MAX_NODES = 50_000  # after expansion of aliases
 MAX_DEPTH = 40
 _QUOTE = "quote the expression"
+_WINDOW = 50  # entries of a list that one split expression may have become
 
 
 @dataclass(slots=True)
@@ -155,7 +156,7 @@ class _Composer:
             raw = raw[offset:]
         plain = not event.style
         scalar = Scalar(line, column + offset, event.value, plain)
-        scalar.columns = _columns(raw, event.value, event.style, column + offset)
+        scalar.columns = columns_of(raw, event.value, event.style, column + offset)
         return scalar
 
     def _alias(self, anchor: str, line: int, column: int) -> Node:
@@ -304,7 +305,7 @@ class _Composer:
         for i, item in enumerate(items):
             depth = _open_parentheses(item)
             end = i + 1
-            while depth > 0 and end < len(items) and isinstance(items[end], Scalar):
+            while depth > 0 and end < min(len(items), i + _WINDOW) and isinstance(items[end], Scalar):
                 depth += _open_parentheses(items[end])
                 end += 1
             if end > i + 1 and depth == 0:
@@ -327,22 +328,3 @@ def _is_piece(key: Scalar | Bad, value: Node) -> bool:
     if not isinstance(key, Scalar) or not key.plain:
         return isinstance(key, Scalar) and isinstance(value, Scalar) and value.kind == "null"
     return "(" in key.text or ")" in key.text or (isinstance(value, Scalar) and value.kind == "null")
-
-
-def _columns(raw: str, value: str, style: str | None, column: int) -> tuple[int, ...] | None:
-    """The column of each character of a scalar that stands on one line (None: not known)."""
-    if "\n" in raw or "\r" in raw:
-        return None
-    if not style:
-        return tuple(range(column, column + len(value) + 1)) if raw.startswith(value) else None
-    if style == '"' and "\\" not in raw:
-        return tuple(range(column + 1, column + len(value) + 2)) if raw[1:-1] == value else None
-    if style != "'":
-        return None
-    columns: list[int] = []
-    i = 1
-    while i < len(raw) - 1:
-        columns.append(column + i)
-        i += 2 if raw[i : i + 2] == "''" else 1
-    columns.append(column + i)
-    return tuple(columns) if len(columns) == len(value) + 1 else None

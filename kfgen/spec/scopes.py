@@ -10,9 +10,9 @@ import re
 from dataclasses import dataclass, field
 
 from kfgen.errors import Place
-from kfgen.spec.expressions import positions
+from kfgen.spec.lexer import positions
 from kfgen.spec.names import wrong_name
-from kfgen.spec.problems import did_you_mean, short, suggestion
+from kfgen.spec.problems import LIMIT, did_you_mean, short, suggestion
 from kfgen.spec.raw import Path, Written
 from kfgen.spec.shapes import SCOPE_WORDS, SCOPES
 from kfgen.spec.tree import Expression, names
@@ -210,6 +210,8 @@ class Scopes:
         """A misspelt name is a mistake wherever it stands; one never declared is a single mistake."""
         if name in self.doubtful or self._incomplete(written.path):
             return
+        if len(self.problems.mistakes) > LIMIT:
+            return  # these are not shown any more
         near = suggestion(name, [n for n, kind in context.kinds.items() if kind in SCOPES[written.scope]])
         hint = f"did you mean `{near}`?" if near else ""
         if name.lower() in ("inf", "nan", "infinity"):

@@ -9,7 +9,8 @@ import re
 from typing import Any
 
 from kfgen.errors import Place
-from kfgen.spec.expressions import ExpressionError, parse
+from kfgen.spec.expressions import parse
+from kfgen.spec.lexer import ExpressionError
 from kfgen.spec.nodes import Bad, Mapping, Node, Scalar, Sequence, kind_of
 from kfgen.spec.problems import Problems, did_you_mean, short, suggestion
 from kfgen.spec.raw import BAD, Fields, Path, Word, Written, path_text

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kfgen.spec.constants import NotConstant, NoValue, value
-from kfgen.spec.expressions import ExpressionError, parse, positions
+from kfgen.spec.expressions import parse
+from kfgen.spec.lexer import ExpressionError, positions
 from kfgen.spec.tree import FUNCTIONS, Call, Name, Number, names
 
 
@@ -48,6 +49,9 @@ def number(text: str | int) -> Number:
         ("table(-9, [1, 2, 3], [10, 20, 40])", 10),
         ("sin(0) + cos(0) + tan(0) + exp(0) + log(1) + atan2(0, 1) + tanh(0)", 2),
         ("-" * 100 + "1", 1),
+        ("where(1 < 2, " * 100 + "1" + ", 2)" * 100, 1),
+        ("abs(" * 100 + "1" + ")" * 100, 1),
+        ("1**" * 100 + "1", 1),
         ("(" * 100 + "1" + ")" * 100, 1),
         ("1-" * 999 + "1", -998),
         ("*".join(["2"] * 20 + ["1"] * 100), 2**20),
@@ -141,6 +145,8 @@ def test_trees() -> None:
         ("x := 1", 2, "`:`"),
         ("'x'", 0, "`'`"),
         ("-" * 101 + "1", 100, "nested deeper than 100"),
+        ("1 + not (a < b)", 4, "before `not`"),
+        ("where(1 < 2, " * 101 + "1" + ", 2)" * 101, None, "nested deeper"),
         ("(" * 101 + "1" + ")" * 101, 100, "nested deeper than 100"),
         ("1+" * 1000 + "1", None, "more than 2000 nodes"),
         ("x" * 10_001, 0, "longer than 10000"),
@@ -159,8 +165,8 @@ def test_mistakes(text: str, offset: int | None, message: str | None) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["1/0", "sqrt(-1)", "log(0)", "asin(2)", "(-1)**0.5", "0**-1", "2**64**64", "exp(1e10)", "1e300**64", "sinh(1e300)",
-     "2**(64 + 1)", "table(1, [2, 1], [0, 0])"],
+    ["1/0", "sqrt(-1)", "log(0)", "asin(2)", "(-1)**0.5", "0**-1", "2**64**64", "exp(1e10)", "1e300**64",
+     "sinh(1e300)", "2**(64 + 1)", "table(1, [2, 1], [0, 0])"],
 )  # fmt: skip
 def test_no_value(text: str) -> None:
     with pytest.raises(NoValue):

@@ -16,23 +16,22 @@ BASE += (
 )
 
 
-@pytest.mark.parametrize(
-    "name",
-    """
+RESERVED = """
     int restrict class co_await lambda None sin where pi e t dt NULL INFINITY NAN M_PI EOF errno
     true bool I complex INT32_MAX FLT_EPSILON linux PI HALF_PI TWO_PI DEG_TO_RAD F HIGH LOW INPUT
     OUTPUT B0 B1 B01 B11111111 A0 A15 bit word byte boolean round sq constrain radians degrees cli
     sei interrupts PORTB PB3 SREG TCNT1 isnan and or not
-    """.split(),
-)
+"""
+FREE = "x px th v_x B2 B010101010 A P Q R D U S h z omega lambda_ y1 gamma beta PX1 i"
+
+
+@pytest.mark.parametrize("name", RESERVED.split())
 def test_reserved(name: str) -> None:
     assert reserved(name)
     assert wrong_name(name)
 
 
-@pytest.mark.parametrize(
-    "name", "x px th v_x B2 B010101010 A P Q R D U S h z omega lambda_ y1 gamma beta PX1 i".split()
-)
+@pytest.mark.parametrize("name", FREE.split())
 def test_free(name: str) -> None:
     assert wrong_name(name) is None
 
@@ -52,10 +51,11 @@ def test_scalars() -> None:
 def test_identifiers_are_those_of_the_emitted_code() -> None:
     found = {name for name, _, _ in identifiers(loads(BASE))}
     assert found >= {
-        "CAR_NX", "CAR_NU", "CAR_NZ_GPS", "CAR_X", "CAR_OK", "CAR_NOT_POSITIVE", "car_t", "car_real_t", "car_inputs_t",
-        "car_gps_t", "car_parameters_t", "car_status_t", "car_init", "car_predict", "car_update_gps",
-        "car_update_gps_masked", "car_set_state", "car_set_covariance", "car_get_covariance", "CAR_FRACTION_BITS",
-        "CAR_X_LSB", "CAR_X_FROM", "CAR_X_TO", "CAR_U_LSB", "CAR_GPS_EAST_LSB", "CAR_P_LSB",
+        "CAR_NX", "CAR_NU", "CAR_NZ_GPS", "CAR_X", "CAR_OK", "CAR_NOT_POSITIVE", "car_t",
+        "car_real_t", "car_inputs_t", "car_gps_t", "car_parameters_t", "car_status_t", "car_init",
+        "car_predict", "car_update_gps", "car_update_gps_masked", "car_set_state",
+        "car_set_covariance", "car_get_covariance", "CAR_FRACTION_BITS", "CAR_X_LSB", "CAR_X_FROM",
+        "CAR_X_TO", "CAR_U_LSB", "CAR_GPS_EAST_LSB", "CAR_P_LSB",
     }  # fmt: skip
 
 

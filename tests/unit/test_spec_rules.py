@@ -23,10 +23,11 @@ CONTEXT = Context(SPEC, SPEC.let, SPEC.measurements, KINDS)
 @pytest.mark.parametrize(
     ("text", "affine"),
     [
-        ("x + 2*y - 3", True), ("p*x/3", True), ("x/p", True), ("d + y", True), ("3", True), ("sin(p)*x", True),
-        ("where(p > 1, x, 2*x)", True), ("(x + 1)**2 - x**2", True), ("abs(p)*x", True),
-        ("x*y", False), ("x**2", False), ("s", False), ("sin(x)", False), ("abs(x)", False), ("p/x", False),
-        ("where(x > 1, x, 2*x)", False), ("max(x, y)", False), ("sqrt(x)", False), ("d*x", False), ("x*y/y", False),
+        ("x + 2*y - 3", True), ("p*x/3", True), ("x/p", True), ("d + y", True), ("3", True),
+        ("sin(p)*x", True), ("where(p > 1, x, 2*x)", True), ("(x + 1)**2 - x**2", True),
+        ("abs(p)*x", True), ("x*y", False), ("x**2", False), ("s", False), ("sin(x)", False),
+        ("abs(x)", False), ("p/x", False), ("where(x > 1, x, 2*x)", False), ("max(x, y)", False),
+        ("sqrt(x)", False), ("d*x", False), ("x*y/y", False),
     ],
 )  # fmt: skip
 def test_affine(text: str, affine: bool) -> None:

@@ -9,7 +9,17 @@ from fractions import Fraction
 import mpmath
 
 from kfgen.errors import Place
-from kfgen.spec.constants import NotConstant, NoValue, Value, environment_of, keep, less, real, value
+from kfgen.spec.constants import (
+    NotConstant,
+    NoValue,
+    Value,
+    environment_of,
+    keep,
+    less,
+    real,
+    value,
+    with_parameters,
+)
 from kfgen.spec.problems import Problems
 from kfgen.spec.raw import BAD
 from kfgen.spec.scopes import Context, Scopes
@@ -39,7 +49,7 @@ class Facts:
         self.walker, self.spec, self.scopes = walker, spec, scopes
         self.problems: Problems = walker.problems
         self.constant = environment_of(spec, folded=False)
-        self.folded = environment_of(spec)
+        self.folded = with_parameters(spec, self.constant)
         self.fixed_dt = spec.dt is not None and not spec.dt.run_time
         self._known: dict[int, dict[str, Value]] = {}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.errors import Place
-from kfgen.spec.constants import Value, apply
+from kfgen.spec.constants import Value, apply, less
 from kfgen.spec.matrices import close
 from kfgen.spec.problems import short
 from kfgen.spec.rules.facts import Facts, show
@@ -86,7 +86,7 @@ def _initial(facts: Facts, imm: Imm) -> None:
     else:
         _probabilities(facts, imm.mu0, place, "`mu0`")
     floor = facts.value(imm.mu_floor)
-    if floor is not None and not (0 <= floor < Fraction(1, count)):
+    if floor is not None and (floor < 0 or not less(floor, Fraction(1, count))):
         text = f"`mu_floor` must be at least 0 and less than 1/{count}, not {show(floor)}"
         facts.add(imm.mu_floor.place, text, "the default is 1e-9")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import pairwise
 
-from kfgen.spec.constants import NotConstant, NoValue, Value, apply, less, real, truth, value
+from kfgen.spec.constants import NotConstant, NoValue, Value, apply, less, truth, value
 from kfgen.spec.expressions import MAX_EXPONENT
 from kfgen.spec.rules.facts import Facts, Model, show
 from kfgen.spec.tree import Call, Name, Number, Tree
@@ -101,7 +101,7 @@ def _whole_numbers(facts: Facts) -> None:
             facts.add(
                 expression.place, f"version {show(number)} of the language is not known", "write `kfgen: 1`"
             )
-        elif real(number) != int(real(number)):
+        elif number != apply("floor", [number]):
             facts.add(expression.place, f"`{key}` is {show(number)}", "write a whole number")
         elif number < shape.low or (shape.high is not None and number > shape.high):
             limits = f"between {shape.low} and {shape.high}"

@@ -1,0 +1,134 @@
+"""Run a scheduled program on numbers of a scalar type: what the printed C must give, bit for bit.
+
+The arithmetic is the scalar's own (`Scalar.evaluate`); this module only walks statements.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from kfgen.ir.nodes import Node
+from kfgen.ir.program import Assign, Declare, Flag, For, Function, Guard, If, Let, Section, Statement, Store
+from kfgen.scalars.base import Scalar
+
+
+@dataclass
+class Memory:
+    """What a function is given: `kf.x` -> list, `u.gyro` -> number. Stores change it."""
+
+    arrays: dict[str, list[Any]] = field(default_factory=dict)
+    numbers: dict[str, Any] = field(default_factory=dict)
+
+
+class _Return(Exception):  # noqa: N818 - it is control flow, not an error
+    def __init__(self, status: str) -> None:
+        self.status = status
+
+
+def run(function: Function, scalar: Scalar, memory: Memory) -> set[str]:
+    """Execute a function; returns the names of the status flags (empty: OK)."""
+    machine = _Machine(scalar, memory)
+    try:
+        machine.block(function.body)
+    except _Return as result:
+        kept = machine.flags if result.status == "GATED" else set()  # an error comes alone
+        return (kept | {result.status}) - {"OK"}
+    return machine.flags
+
+
+class _Machine:
+    def __init__(self, scalar: Scalar, memory: Memory) -> None:
+        self.scalar = scalar
+        self.memory = memory
+        self.locals: dict[str, Any] = {}
+        self.counters: dict[Node, int] = {}
+        self.flags: set[str] = set()
+
+    def block(self, body: list[Statement]) -> None:
+        for statement in body:
+            self.statement(statement)
+
+    def statement(self, statement: Statement) -> None:
+        match statement:
+            case Section():
+                return
+            case Let(node=node, name=name):
+                self.locals[name] = self.value(node)
+            case Declare(name=name, size=size, value=value):
+                self.locals[name] = [None] * size if size is not None else self.value(value)
+            case Assign(name=name, index=index, node=node):
+                value = self.value(node)
+                if index is None:
+                    self.locals[name] = value
+                else:
+                    self.locals[name][self.value(index)] = value
+            case Store():
+                self.store(statement)
+            case Guard(condition=condition, status=status, before=before):
+                if self.value(condition):
+                    for store in before:
+                        self.store(store)
+                    raise _Return(status)
+            case Flag(condition=condition, flag=flag):
+                if self.value(condition):
+                    self.flags.add(flag)
+            case For():
+                self.loop(statement)
+            case If(condition=condition, body=body):
+                if self.value(condition):
+                    self.block(body)
+
+    def loop(self, statement: For) -> None:
+        start, stop = self.value(statement.start), self.value(statement.stop)
+        counters = range(start, stop)
+        for i in reversed(counters) if statement.down else counters:
+            self.locals[statement.variable] = i
+            self.block(statement.body)
+
+    def store(self, store: Store) -> None:
+        value = self.value(store.node)
+        if store.index is None:
+            self.memory.numbers[store.name] = value
+        else:
+            self.memory.arrays[store.name][self.value(store.index)] = value
+
+    def value(self, node: Node) -> Any:
+        match node.op:
+            case "const":
+                return self.constant(node)
+            case "variable" | "counter":
+                return self.locals[node.data]
+            case "field":
+                return self.memory.numbers[node.data]
+            case "element":
+                return self.memory.arrays[node.data][self.value(node.args[0])]
+            case "read":
+                found = self.locals[node.data]
+                return found[self.value(node.args[0])] if node.args else found
+            case "real":
+                return self.scalar.convert(self.value(node.args[0]))
+            case "half":
+                return self.value(node.args[0]) // 2
+            case "select":  # as C's ?: only the chosen branch is evaluated
+                return self.value(node.args[1] if self.value(node.args[0]) else node.args[2])
+            case "and":
+                return self.value(node.args[0]) and self.value(node.args[1])
+            case "or":
+                return self.value(node.args[0]) or self.value(node.args[1])
+        args = [self.value(a) for a in node.args]
+        if node.kind == "int":
+            a, b = args
+            return a + b if node.op == "add" else a - b if node.op == "sub" else a * b
+        if node.op in ("lt", "le") and node.args[0].kind == "int":
+            return args[0] < args[1] if node.op == "lt" else args[0] <= args[1]
+        return self.scalar.evaluate(node.op, node.data, args)
+
+    def constant(self, node: Node) -> Any:
+        value: Fraction = node.data
+        if node.kind == "int":
+            return int(value)
+        if node.kind == "bool":
+            return bool(value)
+        return self.scalar.convert(value)
