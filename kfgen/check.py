@@ -91,9 +91,7 @@ class Outcome:
             f"  P: error at most {self.P.error:.1e} of sqrt(P_ii P_jj){place(self.P)}",
         ]
         if self.differences:
-            lines.append(
-                f"  status: differs in {len(self.differences)} calls, first in {self.differences[0]}"
-            )
+            lines.append(f"  status: differs in {len(self.differences)} calls, first in {self.differences[0]}")
         verdict = "passed" if self.passed else "FAILED"
         return "\n".join([*lines, f"  tolerance {self.tolerance:.0e}: {verdict}"])
 

@@ -16,6 +16,9 @@ class Place:
     path: str = ""
 
 
+NOWHERE = Place()
+
+
 @dataclass(frozen=True, order=True)
 class Mistake:
     """One mistake of a spec: where, what is wrong, and what to write instead."""

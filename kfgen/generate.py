@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 from kfgen.emit.render import render
 from kfgen.emit.view import View, make_view
@@ -57,7 +58,7 @@ def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:
     return build(spec, scalar).files
 
 
-def _epsilon(scalar: str) -> object:
+def _epsilon(scalar: str) -> Fraction:
     if scalar in SCALARS:
         return SCALARS[scalar].epsilon
     if scalar.startswith("q"):

@@ -22,9 +22,7 @@ def check_scalar(scalar: str) -> str:
     match = _Q.fullmatch(scalar)
     if match and int(match[1]) + int(match[2]) == 32 and 8 <= int(match[2]) <= 24:
         return scalar
-    raise KfgenError(
-        f"scalar `{scalar}` is unknown; write float, double, or q<m>.<n> with m + n = 32 and 8 <= n <= 24"
-    )
+    raise KfgenError(f"scalar `{scalar}` is unknown; write float, double, or q<m>.<n> with m + n = 32 and 8 <= n <= 24")
 
 
 def override(spec: Spec, scalar: str | None = None, **changes: Any) -> Spec:

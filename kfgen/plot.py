@@ -126,9 +126,7 @@ def _state(axes: Any, spec: Spec, log: Log, result: RunResult, i: int, keep: sli
             _dots(axes, result.t, log.columns[column])
     truth = log.columns.get(f"true.{state.name}")
     if truth is not None:
-        axes.plot(
-            t, _unbroken(truth[keep], period), color=TRUTH, linewidth=1.0, linestyle="--", label="truth"
-        )
+        axes.plot(t, _unbroken(truth[keep], period), color=TRUTH, linewidth=1.0, linestyle="--", label="truth")
     axes.plot(t, _unbroken(x, period), color=ESTIMATE, linewidth=1.3, label="estimate")
     axes.set_ylabel(state.name + (f" [{state.unit}]" if state.unit else ""))
     _focus(axes, x, sigma, truth)
@@ -152,9 +150,7 @@ def _focus(axes: Any, x: Array, sigma: Array, truth: Array | None) -> None:
 def _dots(axes: Any, t: Array, z: Array) -> None:
     there = np.isfinite(z)
     size = float(np.clip(3000 / max(there.sum(), 1), 3, 16))
-    axes.scatter(
-        t[there], z[there], s=size, color=MEASURED, alpha=0.6, linewidths=0, label="measured", zorder=1.5
-    )
+    axes.scatter(t[there], z[there], s=size, color=MEASURED, alpha=0.6, linewidths=0, label="measured", zorder=1.5)
 
 
 def _modes(axes: Any, names: list[str], t: Array, mu: Array) -> None:

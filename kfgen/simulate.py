@@ -64,14 +64,10 @@ def simulate(
             return _simulate(spec, steps, random, every or {}, gaps)
     except StepError as error:
         reason = error.status.name or "an error"
-        raise KfgenError(
-            f"{spec.name}: the model met {reason} on its own track; try another --seed"
-        ) from None
+        raise KfgenError(f"{spec.name}: the model met {reason} on its own track; try another --seed") from None
 
 
-def _simulate(
-    spec: Spec, steps: int, random: np.random.Generator, every: Mapping[str, int], gaps: float
-) -> Log:
+def _simulate(spec: Spec, steps: int, random: np.random.Generator, every: Mapping[str, int], gaps: float) -> Log:
     worlds = [_World(each) for each in _mode_specs(spec)]
     model = worlds[0].model
     t, dt = _times(spec, model, steps, random)
@@ -142,9 +138,7 @@ class _World:
         after = self._process.advance(x, _draw(Qw, random), context)
         after = after + _draw(self._additive.linearise(x, context).Q, random)
         if not np.all(np.isfinite(after)):
-            raise KfgenError(
-                f"{self.spec.name}: the simulated state left the finite numbers; try another --seed"
-            )
+            raise KfgenError(f"{self.spec.name}: the simulated state left the finite numbers; try another --seed")
         return self._placed(after)
 
     def measure(self, name: str, x: Array, context: Context, random: np.random.Generator) -> Array:
@@ -183,8 +177,7 @@ def _silenced(
         return tuple(silent), None
     rows = tuple(
         tuple(
-            replace(entry, tree=Number(Fraction(0))) if which[i] or which[j] else entry
-            for j, entry in enumerate(row)
+            replace(entry, tree=Number(Fraction(0))) if which[i] or which[j] else entry for j, entry in enumerate(row)
         )
         for i, row in enumerate(covariance)
     )

@@ -95,9 +95,7 @@ def generate_all(paths: Sequence[Path], directory: Path, scalar: str | None) -> 
         # folders that differ only in case are one on some file systems
         other = places.setdefault(spec.name.lower(), path)
         if other is not path:
-            raise KfgenError(
-                f"{other} and {path} are both named `{spec.name}`; their files would overwrite each other"
-            )
+            raise KfgenError(f"{other} and {path} are both named `{spec.name}`; their files would overwrite each other")
     from kfgen.generate import build as generate
 
     built = []
@@ -134,14 +132,10 @@ def report_differences(built: Sequence[Built]) -> int:
             count += 1
             before = "/dev/null" if old is None else str(path)
             # split at line feeds only: a carriage return on the disk is a difference, not a line end
-            lines = difflib.unified_diff(
-                _lines(old or ""), _lines(text), before, f"{path} (would be written)"
-            )
+            lines = difflib.unified_diff(_lines(old or ""), _lines(text), before, f"{path} (would be written)")
             click.echo("".join(line if line.endswith("\n") else f"{line}\n" for line in lines), nl=False)
     if count:
-        click.echo(
-            f"kfgen: {count} file{'s differ' if count > 1 else ' differs'}; run `kfgen build`", err=True
-        )
+        click.echo(f"kfgen: {count} file{'s differ' if count > 1 else ' differs'}; run `kfgen build`", err=True)
     return count
 
 

@@ -7,9 +7,7 @@ import click
 from kfgen.commands.options import example
 
 
-@click.command(
-    short_help="Print the reference of the spec language.", epilog=example("kfgen language > language.md")
-)
+@click.command(short_help="Print the reference of the spec language.", epilog=example("kfgen language > language.md"))
 def language() -> None:
     """Print the reference of the spec language as Markdown."""
     from kfgen.spec.reference import markdown

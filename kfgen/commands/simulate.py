@@ -27,13 +27,9 @@ def _rates(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ..
     ),
 )
 @spec_argument
-@click.option(
-    "-o", "out", type=click.Path(path_type=Path), required=True, metavar="LOG.csv", help="The log to write."
-)
+@click.option("-o", "out", type=click.Path(path_type=Path), required=True, metavar="LOG.csv", help="The log to write.")
 @click.option("--steps", type=click.IntRange(1), default=500, show_default=True, help="Rows of the log.")
-@click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed gives the same log."
-)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="The same seed gives the same log.")
 @click.option(
     "--every", multiple=True, callback=_rates, metavar="SENSOR=N",
     help="This sensor measures in every N-th row only; may be repeated.",

@@ -6,7 +6,16 @@ from collections.abc import Callable
 
 from kfgen.ir.nodes import Node, Table
 from kfgen.ir.program import (
-    Assign, Declare, Flag, For, Guard, If, Let, Section, Statement, Store,
+    Assign,
+    Declare,
+    Flag,
+    For,
+    Guard,
+    If,
+    Let,
+    Section,
+    Statement,
+    Store,
 )  # fmt: skip
 from kfgen.scalars import Scalar
 
@@ -104,7 +113,12 @@ class Printer:
                 args.append(self.scalar.literal(node.data / 2))
             elif op in ("table", "slope"):
                 name = self.tables[node.data]
-                args += [f"{name}_x", f"{name}_y" if op == "table" else "", f"{name}_slope", str(len(node.data.x))]
+                args += [
+                    f"{name}_x",
+                    f"{name}_y" if op == "table" else "",
+                    f"{name}_slope",
+                    str(len(node.data.x)),
+                ]
             return f"{self.prefix}_{op}({', '.join(a for a in args if a)})"
         return f"{self.scalar.function(op)}({', '.join(args)})"
 
@@ -184,13 +198,13 @@ class Printer:
                 return _wrapped(f"if ({e(condition)}) {{ flags |= {self.prefix.upper()}_{flag}; }}", depth)
             case For(variable=v, start=start, stop=stop, body=inner, down=down):
                 if down:
-                    head = f"for (int {v} = {e(stop, _SUM)} - 1; {v} >= {e(start)}; {v}--) {{"
+                    opening = f"for (int {v} = {e(stop, _SUM)} - 1; {v} >= {e(start)}; {v}--) {{"
                 else:
-                    head = f"for (int {v} = {e(start)}; {v} < {e(stop)}; {v}++) {{"
-                return _wrapped(head, depth) + self.statements(inner, depth + 1) + ["    " * depth + "}"]
+                    opening = f"for (int {v} = {e(start)}; {v} < {e(stop)}; {v}++) {{"
+                return _wrapped(opening, depth) + self.statements(inner, depth + 1) + ["    " * depth + "}"]
             case If(condition=condition, body=inner):
-                head = f"if ({e(condition)}) {{"
-                return _wrapped(head, depth) + self.statements(inner, depth + 1) + ["    " * depth + "}"]
+                opening = f"if ({e(condition)}) {{"
+                return _wrapped(opening, depth) + self.statements(inner, depth + 1) + ["    " * depth + "}"]
 
 
 def _assignment(target: str, value: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from importlib.metadata import PackageNotFoundError, version
 
 import sympy
@@ -161,8 +162,8 @@ class _ViewMaker:
             sha256=spec.sha256,
             ram=self.ram(),
             scalar=ScalarView(
-                scalar.name, scalar.c_type, scalar.helpers, scalar.literal(scalar.nearest_integer(0)),
-                scalar.literal(scalar.nearest_integer(1)), scalar.function("ceil"),
+                scalar.name, scalar.c_type, scalar.helpers, scalar.literal(Fraction(0)), scalar.literal(Fraction(1)),
+                scalar.function("ceil"),
             ),
             states=self.aligned([
                 Named(s.name, _about(s.unit, s.doc), index_name=f"{self.NAME}_{s.name.upper()}") for s in spec.states
@@ -215,7 +216,9 @@ class _ViewMaker:
         rows: list[Named] = []
         for block in self.code.blocks:
             if block.name == "nis" and self.spec.parameters:
-                rows.append(Named("parameters", "may be changed while the filter runs", type=f"{self.name}_parameters_t"))
+                rows.append(
+                    Named("parameters", "may be changed while the filter runs", type=f"{self.name}_parameters_t")
+                )
             dimension = "" if block.size is None else f"[{block.size}]"
             rows.append(Named(block.name, block.doc, type=types[block.kind], dimension=dimension))
         width = max(len(r.type + r.name + r.dimension) for r in rows)
@@ -303,7 +306,7 @@ class _ViewMaker:
             parameters=tuple(parameters),
             returns=returns,
             costs=tuple(_fill(cost + ".", WIDTH - 6)) if cost else (),
-            prototype=tuple([*prototype[:-1], prototype[-1] + ";"]),
+            prototype=(*prototype[:-1], prototype[-1] + ";"),
             definition=tuple(prototype),
             opening=tuple(line.rstrip() for line in opening),
             body=tuple(body),
@@ -313,7 +316,11 @@ class _ViewMaker:
     def outcome(self, f: Function) -> str:
         flags = sorted({s.flag for s in walk(f.body) if isinstance(s, Flag)})
         text = f"{self.NAME}_OK" + "".join(f", {self.NAME}_{flag}" for flag in flags)
-        return f"{text}, or an error that leaves *kf as it was" if f.name != "init" else f"{text}, or {self.NAME}_NULL_ARGUMENT"
+        return (
+            f"{text}, or an error that leaves *kf as it was"
+            if f.name != "init"
+            else f"{text}, or {self.NAME}_NULL_ARGUMENT"
+        )
 
     def argument(self, a: Argument) -> str:
         kind = a.type.format(name=self.name)

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
+
+import sympy
 
 from kfgen.errors import Mistake, SpecError
 from kfgen.filters import process
 from kfgen.filters.base import FilterCode
 from kfgen.filters.ekf import Ekf
 from kfgen.filters.full import Full
-from kfgen.filters.linear import check_linear
 from kfgen.filters.numbers import is_zero
 from kfgen.filters.order import best_order
 from kfgen.filters.sensor import linearise
 from kfgen.filters.ud import UD
 from kfgen.filters.unbuilt import unbuilt
 from kfgen.ir.nodes import Table
+from kfgen.ir.program import roots, walk
 from kfgen.ir.trace import Trace
 from kfgen.model import Model, build_model
 from kfgen.spec.types import Spec
@@ -31,8 +34,6 @@ def build_filter(spec: Spec, epsilon: Fraction, taken: frozenset[str]) -> Filter
     if missing:
         raise SpecError(missing)
     model = build_model(spec)
-    if spec.filter.type == "kf":
-        check_linear(model)
     _check_measurements(model)
     n = len(model.states)
     update = spec.filter.update
@@ -48,13 +49,15 @@ def _check_measurements(model: Model) -> None:
     """A component whose row of H is zero measures nothing."""
     mistakes = []
     for sensor in model.sensors:
-        t = Trace()
-        t.section("")
-        rows = linearise_rows(t, model, sensor)
+        rows = linearise_rows(Trace(), model, sensor)
         for component, row in zip(sensor.spec.components, rows, strict=True):
             if all(is_zero(h) for h in row):
                 mistakes.append(
-                    Mistake(component.h.place, f"`{component.h.text}` does not depend on any state", "measure a state")
+                    Mistake(
+                        component.h.place,
+                        f"`{component.h.text}` does not depend on any state",
+                        "measure a state",
+                    )
                 )
     if mistakes:
         raise SpecError(mistakes)
@@ -62,10 +65,6 @@ def _check_measurements(model: Model) -> None:
 
 def linearise_rows(t: Trace, model: Model, sensor: Any) -> list[list[Any]]:
     """H alone, before decorrelation."""
-    from dataclasses import replace
-
-    import sympy
-
     m = len(sensor.h)
     plain = replace(
         sensor, R=tuple(tuple(sympy.S.Zero for _ in range(m)) for _ in range(m)), noises=(), noise_covariance=(),
@@ -93,10 +92,6 @@ def _order(model: Model) -> list[int]:
 
 def _with_tables(code: FilterCode) -> FilterCode:
     """Number the tables that the functions use, in the order of their first use."""
-    from dataclasses import replace
-
-    from kfgen.ir.program import roots, walk
-
     found: dict[Table, str] = {}
     for function in code.functions:
         for statement in walk(function.body):

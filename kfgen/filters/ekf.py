@@ -48,7 +48,11 @@ class Ekf:
         model = self.model
         functions = [self.state.init(taken), self.predict(taken)]
         functions += [self.update(sensor, taken) for sensor in model.sensors]
-        functions += [self.state.set_state(taken), self.state.set_covariance(taken), self.state.get_covariance(taken)]
+        functions += [
+            self.state.set_state(taken),
+            self.state.set_covariance(taken),
+            self.state.get_covariance(taken),
+        ]
         identity = self.order == list(range(len(self.order)))
         spec = model.spec.filter
         layout = {"ud": "U D U^T", "full": "full"}[spec.covariance]
@@ -88,10 +92,23 @@ class Ekf:
                 t.name(value, f"f_{model.states[i]}_{model.states[j]}")
         P = self.layout.predict(t, self.layout.load(t), F, Q, noise)
         x = [t.name(value, f"{name}_next") for value, name in zip(result.x, model.states, strict=True)]
-        self._finish(t, x, P, [], after_predict=True, x_changed=[v.node is not p.node for v, p in zip(x, prior.x, strict=True)])
+        self._finish(
+            t,
+            x,
+            P,
+            [],
+            after_predict=True,
+            x_changed=[v.node is not p.node for v, p in zip(x, prior.x, strict=True)],
+        )
         process.store_time(t, model, step)
         body = schedule(t, taken)
-        length = "one step" if model.spec.dt is None else f"one step of {_decimal(model.dt)} s" if model.dt is not None else "a step of dt"
+        length = (
+            "one step"
+            if model.spec.dt is None
+            else f"one step of {_decimal(model.dt)} s"
+            if model.dt is not None
+            else "a step of dt"
+        )
         return Function("predict", arguments, body, f"Advance the estimate by {length}.")
 
     def _finish(self, t: Trace, x: list[Value], P: Any, evidence: list[Value], after_predict: bool,
@@ -138,7 +155,12 @@ class Ekf:
         x, P, nis = self._sequence(t, sensor, innovation, gate)
         self._finish(t, x, P, [nis], after_predict=False, x_changed=[True] * len(x))
         t.store("kf.nis", None, nis)
-        return Function(f"update_{sensor.name}", arguments, schedule(t, taken), f"Take a measurement of {sensor.name} into account.")
+        return Function(
+            f"update_{sensor.name}",
+            arguments,
+            schedule(t, taken),
+            f"Take a measurement of {sensor.name} into account.",
+        )
 
     def _sequence(self, t: Trace, sensor: SensorModel, innovation: Innovation, gate: Value | None
                   ) -> tuple[list[Value], Any, Value]:  # fmt: skip
@@ -159,8 +181,13 @@ class Ekf:
         group = getattr(layout, "group", 1)
         for first in range(0, len(rows), group):
             part = range(first, min(first + group, len(rows)))
-            t.section("gain and covariance: " + ", ".join(names[c] for c in part) if len(rows) > 1 else "gain and covariance")
-            low = [getattr(layout, "tolerance", lambda P, h: 0)(P, rows[c]) if not is_positive(variances[c]) else 0 for c in part]
+            t.section(
+                "gain and covariance: " + ", ".join(names[c] for c in part) if len(rows) > 1 else "gain and covariance"
+            )
+            low = [
+                getattr(layout, "tolerance", lambda P, h: 0)(P, rows[c]) if not is_positive(variances[c]) else 0
+                for c in part
+            ]
             P, gains, s = layout.update(t, P, [rows[c] for c in part], [variances[c] for c in part])
             for c, K, variance, tolerance in zip(part, gains, s, low, strict=True):
                 t.name(variance, f"s_{names[c]}")
@@ -168,7 +195,9 @@ class Ekf:
                 nu = y[c] if is_zero(correction) else y[c] - correction
                 if not is_zero(correction):
                     t.name(nu, f"nu_{names[c]}")
-                moved = [m if is_zero(k) else k * nu if is_zero(m) else m + k * nu for m, k in zip(moved, K, strict=True)]
+                moved = [
+                    m if is_zero(k) else k * nu if is_zero(m) else m + k * nu for m, k in zip(moved, K, strict=True)
+                ]
                 square = nu * nu / variance
                 if is_positive(variances[c]):
                     tests.append(~(variance > 0))

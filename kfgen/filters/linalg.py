@@ -9,7 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from kfgen.filters.numbers import (
-    Number, assume_nonnegative, assume_positive, is_one, is_positive, is_zero, select,
+    Number,
+    assume_nonnegative,
+    assume_positive,
+    is_one,
+    is_positive,
+    is_zero,
+    select,
 )  # fmt: skip
 
 Vector = list[Number]

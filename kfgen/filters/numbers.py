@@ -62,7 +62,7 @@ def assume_nonnegative(a: Number) -> Number:
 
 
 def _facts(trace: Trace) -> dict[Node, int]:
-    return trace.__dict__.setdefault("signs", {})
+    return trace.signs
 
 
 def _sign(trace: Trace, node: Node) -> int:

@@ -7,11 +7,11 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.dual import Dual, Evaluator, seeds
+from kfgen.filters.exact import discretise
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.numbers import assume_positive, is_nonnegative, is_positive, is_zero
+from kfgen.filters.numbers import assume_nonnegative, assume_positive, is_nonnegative, is_zero
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
-from kfgen.filters.exact import discretise
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,9 @@ def advance(t: Trace, model: Model, prior: Prior, step: Step) -> Advance:
         assert step.dt is not None
         if model.spec.dynamics.integrator == "exact":
             linear = discretise(model)
-            after, added = linear.advance(t, at_prior, prior.duals, step.dt)
+            after = linear.advance(t, at_prior, prior.duals, step.dt)
+            index = [i for i, w in enumerate(model.noises) if w.density]
+            added, extra = linear.noise(t, at_prior, [[Qw[i][j] for j in index] for i in index], step.dt)
             Q = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(Q, added, strict=True)]
         else:
             after = _integrate(t, model, prior, step.dt, held)
@@ -139,7 +141,10 @@ def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Ro
         U, weights = linalg.udu(part)
         for d in weights:
             _guard_variance(t, d)
-        G = [[linalg.dot([row[k] for k in range(j + 1)], [*[U[k][j] for k in range(j)], 1]) for j in range(q)] for row in G]
+        G = [
+            [linalg.dot([row[k] for k in range(j + 1)], [*[U[k][j] for k in range(j)], 1]) for j in range(q)]
+            for row in G
+        ]
         G = [[t.value(g) for g in row] for row in G]
     columns = []
     for j, weight in enumerate(weights):
@@ -153,8 +158,6 @@ def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Ro
 
 def _guard_variance(t: Trace, d: Value) -> None:
     if isinstance(d, Value) and not is_nonnegative(d):
-        from kfgen.filters.numbers import assume_nonnegative
-
         t.guard(d < 0, "NOT_POSITIVE", "a noise variance is negative")
         assume_nonnegative(d)
 
@@ -209,7 +212,3 @@ def store_time(t: Trace, model: Model, step: Step) -> None:
     after = t.name(before + term, "t_next")
     t.store("kf.t_lost", None, (after - before) - term)
     t.store("kf.t", None, after)
-
-
-__all__ = ["Advance", "Prior", "Step", "advance", "given", "is_positive", "parameters_and_inputs", "step_length",
-           "store_time", "time_now"]  # fmt: skip

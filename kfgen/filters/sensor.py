@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import sympy
 
 from kfgen.filters import linalg, process
-from kfgen.filters.dual import Evaluator, seeds
+from kfgen.filters.dual import Dual, Evaluator, seeds
 from kfgen.filters.linalg import Rows, Vector
 from kfgen.filters.numbers import assume_nonnegative, is_nonnegative, is_zero
-from kfgen.ir.trace import Trace, Value
+from kfgen.ir.trace import Trace
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
 
@@ -37,7 +37,7 @@ def linearise(t: Trace, model: Model, sensor: SensorModel) -> Innovation:
     if "t" in used:
         given["t"] = process.time_now(t, model)
     if model.dt is not None:
-        given["dt"] = process.Dual(t.value(model.dt))
+        given["dt"] = Dual(t.value(model.dt))
     evaluator = Evaluator(t, model, given)
     components = sensor.spec.components
     predicted = [evaluator(e) for e in sensor.h]
@@ -104,6 +104,3 @@ def permuted(innovation: Innovation, order: list[int]) -> Innovation:
 def needs_inputs(model: Model, sensor: SensorModel) -> bool:
     """Whether an update of the sensor takes u."""
     return bool(set(model.inputs) & model.uses(*model.sensor_expressions(sensor)))
-
-
-__all__ = ["Innovation", "Value", "linearise", "needs_inputs", "permuted"]

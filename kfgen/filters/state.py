@@ -47,7 +47,9 @@ class StateCode:
     def confined(self, t: Trace, x: list[Value]) -> list[Value]:
         """x within its bounds, angles wrapped. Spec's order."""
         out = []
-        for value, bounds, period, name in zip(x, self.model.bounds, self.model.periods, self.model.states, strict=True):
+        for value, bounds, period, name in zip(
+            x, self.model.bounds, self.model.periods, self.model.states, strict=True
+        ):
             if bounds is not None:
                 low, high = t.value(bounds[0]), t.value(bounds[1])
                 value = t.name(value, f"{name}_free") if value.constant is None else value
@@ -82,13 +84,22 @@ class StateCode:
         t = Trace()
         for block in self.blocks():
             if block.size is None:
-                zero = {"real": t.zero, "uint32": t.wrapped(t.pool.integer(0)), "bool": t.wrapped(t.pool.boolean(False))}
+                zero = {
+                    "real": t.zero,
+                    "uint32": t.wrapped(t.pool.integer(0)),
+                    "bool": t.wrapped(t.pool.boolean(False)),
+                }
                 t.store(f"kf.{block.name}", None, zero[block.kind])
                 continue
             _store_runs(t, block)
         for name, value in self.model.parameters:
             t.store(f"kf.parameters.{name}", None, t.value(value))
-        return Function("init", [KF], schedule(t, taken), "Set the state, its covariance and the parameters to their initial values.")
+        return Function(
+            "init",
+            [KF],
+            schedule(t, taken),
+            "Set the state, its covariance and the parameters to their initial values.",
+        )
 
     def set_state(self, taken: frozenset[str]) -> Function:
         """Replace x; the covariance stays."""
@@ -99,7 +110,12 @@ class StateCode:
         for i, value in enumerate(x):
             t.store("kf.x", i, value)
         argument = Argument("x", "{name}_real_t", pointer=True, size=self.n, doc="new state")
-        return Function("set_state", [KF, argument], schedule(t, taken), "Replace the state; angles are wrapped, the covariance stays.")
+        return Function(
+            "set_state",
+            [KF, argument],
+            schedule(t, taken),
+            "Replace the state; angles are wrapped, the covariance stays.",
+        )
 
     def _place(self, t: Trace) -> Callable[[Value], Value]:
         """From an inner position to the state of the spec."""
@@ -116,7 +132,13 @@ class StateCode:
             t.store("P", place(i) * n + place(j), value)
             t.store("P", place(j) * n + place(i), value)
         argument = Argument("P", "{name}_real_t", pointer=True, constant=False, size=n * n, doc="covariance, row-major")
-        return Function("get_covariance", [CONST_KF, argument], schedule(t, taken), "The covariance of the state, in the order of the states.", returns="void")
+        return Function(
+            "get_covariance",
+            [CONST_KF, argument],
+            schedule(t, taken),
+            "The covariance of the state, in the order of the states.",
+            returns="void",
+        )
 
     def set_covariance(self, taken: frozenset[str]) -> Function:
         """Replace P after testing that it is positive semidefinite."""
@@ -141,8 +163,16 @@ class StateCode:
         self._factor(t, P, W)
         t.section("store")
         self.layout.put(t, P, W)
-        argument = Argument("P", "{name}_real_t", pointer=True, size=n * n, doc="covariance, row-major; the upper triangle is read")
-        return Function("set_covariance", [KF, argument], schedule(t, taken), "Replace the covariance; the state stays.")
+        argument = Argument(
+            "P",
+            "{name}_real_t",
+            pointer=True,
+            size=n * n,
+            doc="covariance, row-major; the upper triangle is read",
+        )
+        return Function(
+            "set_covariance", [KF, argument], schedule(t, taken), "Replace the covariance; the state stays."
+        )
 
     def _factor(self, t: Trace, P: Array, W: Array) -> None:
         """W: from the packed upper triangle of P to D on the diagonal and U above (Bierman 1977, III.4).
@@ -173,18 +203,16 @@ def _store_runs(t: Trace, block: Block) -> None:
     """Constants of an array: equal neighbours in a loop, the others one by one."""
     values = block.initial
     start = 0
-    counter = 0
     while start < len(values):
         stop = start
         while stop < len(values) and values[stop] == values[start]:
             stop += 1
         if stop - start >= 4:
-            with t.loop("ijk"[counter % 3], start, stop) as i:
-                t.store(f"kf.{block.name}", i, t.value(values[start]))
-            counter += 1
+            with t.loop("i", start, stop) as counter:
+                t.store(f"kf.{block.name}", counter, t.value(values[start]))
         else:
-            for i in range(start, stop):
-                t.store(f"kf.{block.name}", i, t.value(values[i]))
+            for position in range(start, stop):
+                t.store(f"kf.{block.name}", position, t.value(values[position]))
         start = stop
 
 

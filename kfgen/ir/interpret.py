@@ -56,14 +56,13 @@ class _Machine:
                 return
             case Let(node=node, name=name):
                 self.locals[name] = self.value(node)
-            case Declare(name=name, size=size, value=value):
-                self.locals[name] = [None] * size if size is not None else self.value(value)
+            case Declare(name=name, size=size, value=start):
+                self.locals[name] = [None] * (size or 0) if start is None else self.value(start)
             case Assign(name=name, index=index, node=node):
-                value = self.value(node)
                 if index is None:
-                    self.locals[name] = value
+                    self.locals[name] = self.value(node)
                 else:
-                    self.locals[name][self.value(index)] = value
+                    self.locals[name][self.value(index)] = self.value(node)
             case Store():
                 self.store(statement)
             case Guard(condition=condition, status=status, before=before):

@@ -79,8 +79,10 @@ class Lowering:
         # a division by an integer of the coefficient stays a multiplication by its reciprocal
         numerator = self._times(above)
         value = numerator if not below else numerator / self._times(below)
-        return value * Fraction(int(coefficient.p), int(coefficient.q)) if coefficient.is_Rational else (
-            value * self(coefficient)
+        return (
+            value * Fraction(int(coefficient.p), int(coefficient.q))
+            if coefficient.is_Rational
+            else (value * self(coefficient))
         )
 
     def _times(self, factors: list[Value]) -> Value:

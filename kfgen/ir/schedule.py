@@ -9,10 +9,21 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from fractions import Fraction
 
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import (
-    Assign, Declare, Flag, For, Guard, If, Let, Section, Statement, Store, roots,
+    Assign,
+    Declare,
+    Flag,
+    For,
+    Guard,
+    If,
+    Let,
+    Section,
+    Statement,
+    Store,
+    roots,
 )  # fmt: skip
 from kfgen.ir.trace import Block, Trace
 
@@ -20,10 +31,9 @@ _BASE = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "
          "fabs", "floor", "ceil", "hypot", "fmin", "fmax", "fma")  # fmt: skip
 LIBRARY_NAMES = frozenset(name + suffix for name in _BASE for suffix in ("", "f"))
 # names that a local must not take: arguments, what the text around it uses, functions of <math.h>
-RESERVED = LIBRARY_NAMES | frozenset(
-    "kf u z dt x P flags order i j k sum p w total j0 j1 jn y0 y1 yn gamma signgam erf erfc log2 log10 exp2 cbrt "
-    "round trunc isnan isinf isfinite NULL int8_t int16_t int32_t uint8_t uint16_t uint32_t".split()
-)
+_TAKEN = """kf u z dt x P flags order i j k sum p w total j0 j1 jn y0 y1 yn gamma signgam erf erfc log2 log10 exp2
+cbrt round trunc isnan isinf isfinite NULL int8_t int16_t int32_t uint8_t uint16_t uint32_t"""
+RESERVED = LIBRARY_NAMES | frozenset(_TAKEN.split())
 MAX_TERMS = 24  # of one sum: beyond it a sum stays nested, for the reader's sake
 
 
@@ -105,7 +115,7 @@ class _Scheduler:
         found = self.fused.get(node)
         if found is not None:
             return found
-        if node.kind != "int" and node.op in ("add", "sub") and not node.args[0].kind == "int":
+        if node.kind != "int" and node.op in ("add", "sub") and node.args[0].kind != "int":
             terms: list[tuple[int, list[Node]]] = []
             self._terms(node, 1, True, terms)
             if terms[0][0] < 0:  # begin with a positive term where there is one
@@ -168,7 +178,7 @@ class _Scheduler:
 
     def _snapshots(self, block: Block) -> None:
         """Fields that are read after they have been stored are kept in a local from before."""
-        stored: set[tuple[str, int | None]] = set()
+        stored: set[tuple[str, Fraction | None]] = set()
         for item in block.items:
             if isinstance(item, Node):
                 if not (self.uses[item] and self._shared(item)):
@@ -180,9 +190,9 @@ class _Scheduler:
                 node = reads.pop()
                 if node in self.kept or (self._shared(node) and node.op not in ("field", "element")):
                     continue
-                if node.op == "element" and (node.data, node.args[0].constant) in stored:
-                    self.kept.add(node)
-                elif node.op == "field" and (node.data, None) in stored:
+                if (node.op == "element" and (node.data, node.args[0].constant) in stored) or (
+                    node.op == "field" and (node.data, None) in stored
+                ):
                     self.kept.add(node)
                 reads.extend(node.args)
             if isinstance(item, Store):

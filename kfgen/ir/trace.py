@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from kfgen.ir.nodes import BOOL, INT, Node, Pool, Table
+from kfgen.ir.nodes import BOOL, INT, REAL, Node, Pool, Table
 from kfgen.ir.program import Assign, Declare, Flag, For, Guard, If, Section, Statement, Store
 
 Number = int | Fraction
@@ -102,6 +102,7 @@ class Trace:
         self.block = Block()
         self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body
         self.names: dict[Node, str] = {}
+        self.signs: dict[Node, int] = {}  # what is known of the sign of values (see filters.numbers)
 
         self.zero = self.wrapped(self.pool.zero)
         self.one = self.wrapped(self.pool.one)
@@ -213,7 +214,8 @@ class _RecordingPool(Pool):
         self._made: list[tuple[object, ...]] = []
         super().__init__()
 
-    def make(self, op, args=(), data=None, kind="real", volatile=False):  # type: ignore[no-untyped-def]
+    def make(self, op: str, args: tuple[Node, ...] = (), data: object = None, kind: str = REAL,
+             volatile: bool = False) -> Node:  # fmt: skip
         before = self._count
         node = super().make(op, args, data, kind, volatile)
         if self._count != before and op != "const":

@@ -140,7 +140,10 @@ class _Builder:
             self.names[constant.name] = self.tree(constant.value)
         # a fixed step and initial values may use parameters: at their spec values
         parameters = [(p.name, self.number(p.value)) for p in spec.parameters]
-        folded = {**self.names, **{name: sympy.Rational(v.numerator, v.denominator) for name, v in parameters}}
+        folded = {
+            **self.names,
+            **{name: sympy.Rational(v.numerator, v.denominator) for name, v in parameters},
+        }
         step = spec.dt
         nominal = self.number(step.nominal, folded) if step is not None else None
         fixed = nominal if step is not None and not step.run_time else None
@@ -164,7 +167,7 @@ class _Builder:
             Q = tuple(tuple(diagonal[i] if i == j else sympy.S.Zero for j in range(n)) for i in range(n))
         else:
             Q = self.matrix(dynamics.Q)
-        limits = (None, None)
+        limits: tuple[Fraction | None, Fraction | None] = (None, None)
         if step is not None and step.run_time:
             limits = (
                 None if step.minimum is None else self.number(step.minimum),

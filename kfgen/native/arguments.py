@@ -47,15 +47,11 @@ def bits_of(mask: int | Sequence[bool], components: Sequence[str]) -> int:
     full = (1 << len(components)) - 1
     if isinstance(mask, int):
         if not 0 <= mask <= full:
-            raise ValueError(
-                f"mask must be between 0 and {full} for {len(components)} components, not {mask}"
-            )
+            raise ValueError(f"mask must be between 0 and {full} for {len(components)} components, not {mask}")
         return mask
     flags = list(mask)
     if len(flags) != len(components):
-        raise ValueError(
-            f"mask must have one entry per component ({', '.join(components)}), not {len(flags)}"
-        )
+        raise ValueError(f"mask must have one entry per component ({', '.join(components)}), not {len(flags)}")
     return sum(1 << i for i, flag in enumerate(flags) if flag)
 
 

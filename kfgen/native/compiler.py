@@ -102,9 +102,7 @@ def _digest(files: Mapping[str, str], command: Sequence[str], options: Sequence[
 @lru_cache
 def _version(command: tuple[str, ...]) -> str:
     """What the compiler says it is: another version gets other libraries."""
-    done = subprocess.run(
-        [*command, "--version"], capture_output=True, text=True, errors="replace", check=False
-    )
+    done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", check=False)
     return done.stdout.partition("\n")[0]
 
 

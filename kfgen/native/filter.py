@@ -65,9 +65,7 @@ class NativeFilter:
             arguments.append(None if raw is None else raw.item())
         return self._call("predict", *arguments)
 
-    def update(
-        self, sensor: str, z: Row, u: Row | None = None, mask: int | Sequence[bool] | None = None
-    ) -> int:
+    def update(self, sensor: str, z: Row, u: Row | None = None, mask: int | Sequence[bool] | None = None) -> int:
         """Take a measurement in.
 
         z: the components in the spec's order, or a mapping by name. u: where h, R or the sensor's noise use
@@ -142,9 +140,7 @@ class NativeFilter:
     def gate_count(self) -> dict[str, int]:
         """Rejections in a row, by sensor, of those that are counted."""
         prefix = "gate_count_"
-        counts = {
-            n.removeprefix(prefix): getattr(self._kf, n) for n in sorted(self._fields) if n.startswith(prefix)
-        }
+        counts = {n.removeprefix(prefix): getattr(self._kf, n) for n in sorted(self._fields) if n.startswith(prefix)}
         if not counts:
             raise AttributeError(f"filter {self.name} keeps no gate_count; set `code: {{gate_count: true}}`")
         return counts

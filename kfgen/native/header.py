@@ -53,9 +53,7 @@ def parse(text: str, prefix: str) -> Header:
     """Parse the header of the filter `prefix`. KfgenError if it declares no filter of that name."""
     text = _COMMENT.sub(" ", text).replace("\\\n", " ")
     text = _ONLY_CPP.sub(lambda match: match["c"] or "", text)
-    macros = {
-        name: float_of(value) for name, value in _DEFINE.findall(text) if _NUMBER.fullmatch(_bare(value))
-    }
+    macros = {name: float_of(value) for name, value in _DEFINE.findall(text) if _NUMBER.fullmatch(_bare(value))}
     declarations = _declarations(_DIRECTIVE.sub("", text))
     functions: dict[str, tuple[str, ...]] = {}
     for declaration in declarations:
@@ -116,8 +114,6 @@ def _integers(declaration: str, macros: Mapping[str, float]) -> str:
     """Replace the macros of a declaration by their numbers: cffi knows no preprocessor."""
     return re.sub(
         r"\b[A-Z_]\w*\b",
-        lambda match: (
-            str(int(macros[match[0]])) if match[0] in macros and macros[match[0]].is_integer() else match[0]
-        ),
+        lambda match: str(int(macros[match[0]])) if match[0] in macros and macros[match[0]].is_integer() else match[0],
         declaration,
     )

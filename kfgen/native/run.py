@@ -100,9 +100,7 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
         full = (1 << z.shape[1]) - 1
         mask[:, i] = bits if sensor.partial else np.where(bits == full, full, 0)
         values.append(np.where(np.isnan(z), 0.0, z))
-    return Plan(
-        t, step.astype(np.uint8), difference, u, mask, np.hstack(values) if values else np.empty((rows, 0))
-    )
+    return Plan(t, step.astype(np.uint8), difference, u, mask, np.hstack(values) if values else np.empty((rows, 0)))
 
 
 def _held(column: Array, name: str, source: str) -> Array:

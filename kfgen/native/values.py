@@ -57,9 +57,7 @@ class Floating(Value):
         return True
 
     def to_raw(self, values: Array, unit: Array | float) -> NDArray[Any]:
-        with np.errstate(
-            over="ignore", under="ignore", invalid="ignore"
-        ):  # too large for a float becomes infinite
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):  # too large for a float becomes infinite
             return np.asarray(values, dtype=np.float64).astype(self.dtype)
 
     def to_physical(self, raw: NDArray[Any], unit: Array | float) -> Array:

@@ -76,21 +76,16 @@ class Model:
         parameters = tuple(parameter.name for parameter in spec.parameters)
         first = Scope(constants, parameters)
         self.values = {
-            parameter.name: float(first.compile(parameter.value)(first.empty()))
-            for parameter in spec.parameters
+            parameter.name: float(first.compile(parameter.value)(first.empty())) for parameter in spec.parameters
         }
         noises = [noise.name for sensor in spec.measurements for noise in sensor.noise]
         noises += [noise.name for noise in spec.noise]
-        self.scope = Scope(
-            constants, (*parameters, *self.states, *self.inputs, *noises, "t", "dt", Z, PREDICTED)
-        )
+        self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, "t", "dt", Z, PREDICTED))
         self._noise_slots = tuple(self.scope.slots[name] for name in noises)
         for definition in spec.let:
             self.scope.define(definition.name, definition.value)
 
-        self.periods = {
-            i: self.number(state.period) for i, state in enumerate(spec.states) if state.period is not None
-        }
+        self.periods = {i: self.number(state.period) for i, state in enumerate(spec.states) if state.period is not None}
         low, high = np.full(self.n, -math.inf), np.full(self.n, math.inf)
         for i, state in enumerate(spec.states):
             if state.bounds is not None:
@@ -132,11 +127,7 @@ class Model:
             return Covariance(len(names), tuple((i, i, closure) for i, closure in diagonal))
         return Covariance(
             len(names),
-            tuple(
-                (i, j, self.scope.compile(entry))
-                for i, row in enumerate(formulas)
-                for j, entry in enumerate(row)
-            ),
+            tuple((i, j, self.scope.compile(entry)) for i, row in enumerate(formulas) for j, entry in enumerate(row)),
         )
 
     def noise_covariance(self, noise: Sequence[Noise], full: Formulas | None) -> Covariance:

@@ -43,9 +43,7 @@ class Process:
         self._continuous = dynamics.form == "continuous"
         self._integrator = dynamics.integrator
         self._substeps = dynamics.substeps
-        self._f = [
-            model.scope.compile(dynamics.f[name]) if name in dynamics.f else None for name in model.states
-        ]
+        self._f = [model.scope.compile(dynamics.f[name]) if name in dynamics.f else None for name in model.states]
         self._Q = model.covariance(dynamics.Q, model.states)
         self._Qw = model.noise_covariance(spec.noise, spec.noise_covariance)
         names = [noise.name for noise in spec.noise]
@@ -96,9 +94,7 @@ class Process:
         joint = variables([*x, *np.zeros(len(self._held))], order=2)
         return self._advance(joint[: self.model.n], joint[self.model.n :], context)
 
-    def _rate(
-        self, x: Sequence[Number], held: Sequence[Number], white: Sequence[Number], context: Context
-    ) -> Numbers:
+    def _rate(self, x: Sequence[Number], held: Sequence[Number], white: Sequence[Number], context: Context) -> Numbers:
         """The formulas of f at (x, noises): dx/dt in continuous form, else the next state."""
         noise = {self._names[i]: number for i, number in zip(self._held, held, strict=True)}
         noise |= {self._names[i]: number for i, number in zip(self._white, white, strict=True)}
@@ -177,9 +173,7 @@ def _rk4(f: Derivative, x: Numbers, h: float) -> Numbers:
     k2 = f(_along(x, 0.5 * h, k1))
     k3 = f(_along(x, 0.5 * h, k2))
     k4 = f(_along(x, h, k3))
-    return [
-        a + h / 6.0 * (b + 2.0 * c + 2.0 * d + e) for a, b, c, d, e in zip(x, k1, k2, k3, k4, strict=True)
-    ]
+    return [a + h / 6.0 * (b + 2.0 * c + 2.0 * d + e) for a, b, c, d, e in zip(x, k1, k2, k3, k4, strict=True)]
 
 
 _INTEGRATORS: dict[str, Callable[[Derivative, Numbers, float], Numbers]] = {

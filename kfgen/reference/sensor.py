@@ -52,12 +52,10 @@ class SensorModel:
         self.partial = sensor.partial
         self._h = [model.scope.compile(component.h) for component in sensor.components]
         self._periods = [
-            None if component.period is None else model.number(component.period)
-            for component in sensor.components
+            None if component.period is None else model.number(component.period) for component in sensor.components
         ]
         self._residuals: list[Closure | None] = [
-            None if c.residual is None else model.scope.compile(_private(c.residual.tree))
-            for c in sensor.components
+            None if c.residual is None else model.scope.compile(_private(c.residual.tree)) for c in sensor.components
         ]
         own = {c.name: c.variance for c in sensor.components if c.variance is not None}
         self._R = model.covariance(own if sensor.R is None else sensor.R, self.components)
@@ -65,9 +63,7 @@ class SensorModel:
         self._Re = model.noise_covariance(sensor.noise, sensor.noise_covariance)
         self.takes_inputs = bool(_reach(model, sensor) & set(model.inputs))
 
-    def predict(
-        self, x: Sequence[Number], e: Sequence[Number], context: Context, used: Sequence[int]
-    ) -> list[Number]:
+    def predict(self, x: Sequence[Number], e: Sequence[Number], context: Context, used: Sequence[int]) -> list[Number]:
         """h of the components in use at the state x (n) and the noise inputs e."""
         environment = self.model.environment(context, x, dict(zip(self._noises, e, strict=True)))
         return [self._h[i](environment) for i in used]
@@ -133,9 +129,7 @@ def _reach(model: Model, sensor: Sensor) -> set[str]:
     definitions = {definition.name: definition.value for definition in model.spec.let}
     found: set[str] = set()
     trees = [formula.tree for formula in formulas if formula is not None]
-    trees += [
-        _private(component.residual.tree) for component in sensor.components if component.residual is not None
-    ]
+    trees += [_private(component.residual.tree) for component in sensor.components if component.residual is not None]
     pending = [name for tree in trees for name in names(tree)]
     while pending:
         name = pending.pop()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -60,10 +61,6 @@ class Floating:
         if op in _LIBM or op == "ceil":
             return op + self.suffix
         raise KeyError(op)
-
-    @staticmethod
-    def nearest_integer(value: int) -> Fraction:
-        return Fraction(value)
 
     def convert(self, value: Any) -> Any:
         if isinstance(value, Fraction):
@@ -136,7 +133,7 @@ def _slope(s: Floating, table: Any, a: Any) -> Any:
 def slopes(table: Any) -> list[Fraction]:
     """The slope of each segment of a table."""
     pairs = list(zip(table.x, table.y, strict=True))
-    return [(y1 - y0) / (x1 - x0) for (x0, y0), (x1, y1) in zip(pairs, pairs[1:], strict=False)]
+    return [(y1 - y0) / (x1 - x0) for (x0, y0), (x1, y1) in pairwise(pairs)]
 
 
 _OPERATIONS: dict[str, Callable[..., Any]] = {
@@ -165,4 +162,3 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 FLOAT = Floating("float", np.float32, "f")
 DOUBLE = Floating("double", np.float64, "")
-

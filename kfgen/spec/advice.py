@@ -23,7 +23,5 @@ def warnings(spec: Spec) -> list[Mistake]:
             continue
         if less(alpha, Fraction(1, 20)):
             text = f"alpha below 0.05 makes weights that {spec.scalar} cannot carry"
-            found.append(
-                Mistake(points.alpha.place, text, "choose alpha between 0.05 and 1, or `scalar: double`")
-            )
+            found.append(Mistake(points.alpha.place, text, "choose alpha between 0.05 and 1, or `scalar: double`"))
     return sorted(set(found))  # modes may share a filter

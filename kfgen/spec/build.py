@@ -213,9 +213,7 @@ class Builder:
             )
         return "angle", Expression(Call("mul", (Number(Fraction(2)), Name("pi"))), "2*pi", f.at("kind"))
 
-    def variance(
-        self, f: Fields, covered: bool, needed: bool = True, more: tuple[str, ...] = ()
-    ) -> Expression | None:
+    def variance(self, f: Fields, covered: bool, needed: bool = True, more: tuple[str, ...] = ()) -> Expression | None:
         """std squared, or var (or one of `more`): exactly one of them, or none where a matrix covers it."""
         given = [key for key in ("std", "var", *more) if key in f]
         if covered:
@@ -223,23 +221,17 @@ class Builder:
         choices = ", ".join(f"`{key}`" for key in ("std", "var", *more))
         if len(given) > 1:
             listed = " and ".join(f"`{key}`" for key in given)
-            self.problems.add(
-                f.places[given[1]], f"{listed} are given both", f"write exactly one of {choices}"
-            )
+            self.problems.add(f.places[given[1]], f"{listed} are given both", f"write exactly one of {choices}")
         if not given:
             if needed and not f.bad:
                 if not self.mistaken(f):
-                    self.problems.add(
-                        f.place, f"one of {choices} is missing", "write `std: 0` where it is exact"
-                    )
+                    self.problems.add(f.place, f"one of {choices} is missing", "write `std: 0` where it is exact")
                 return self.bad(f.place)
             return self.bad(f.place) if f.bad else None
         expression: Expression = self.formula(f, given[0])
         if given[0] not in ("std", "root_density") or expression.tree == BAD:
             return expression
-        return Expression(
-            Call("pow", (expression.tree, Number(Fraction(2)))), expression.text, expression.place
-        )
+        return Expression(Call("pow", (expression.tree, Number(Fraction(2)))), expression.text, expression.place)
 
     def both(self, holder: Fields, matrix_key: str, written: Any) -> None:
         """A full covariance beside single variances: one mistake, whoever has them."""
@@ -256,8 +248,7 @@ class Builder:
         """Whether an unknown key has been reported here, which was probably meant for the missing one."""
         prefix = path_text(f.path) + "."
         return any(
-            m.place.path.startswith(prefix) and m.message.startswith("unknown key")
-            for m in self.problems.mistakes
+            m.place.path.startswith(prefix) and m.message.startswith("unknown key") for m in self.problems.mistakes
         )
 
     def covariances(self, top: Fields) -> tuple[Covariance, ...]:

@@ -84,9 +84,7 @@ class FilterBuilder:
         if not isinstance(p, Fields):
             p = Fields(f.place)
         kind = p.get("kind", "merwe")
-        defaults = {"merwe": (1, 2, 0), "wiki": (1, 2, None), "julier": (None, None, 0)}.get(
-            kind, (None,) * 3
-        )
+        defaults = {"merwe": (1, 2, 0), "wiki": (1, 2, None), "julier": (None, None, 0)}.get(kind, (None,) * 3)
         values: list[Expression | None] = []
         for key, default in zip(("alpha", "beta", "kappa"), defaults, strict=True):
             filled = None if default is None else Expression(Number(Fraction(default)), str(default), p.place)
@@ -124,9 +122,7 @@ class FilterBuilder:
         if "psi_dot" in r and "psi" not in r:
             self.problems.add(r.places["psi_dot"], "`psi_dot` is used beside `psi` only", "remove it")
         if "k" in r and r.get("influence", "huber") != "huber":
-            self.problems.add(
-                r.places["k"], f"`k` is not used by `influence: {r.get('influence')}`", "remove it"
-            )
+            self.problems.add(r.places["k"], f"`k` is not used by `influence: {r.get('influence')}`", "remove it")
         elif "k" in r and "influence" not in r:
             self.problems.add(r.places["k"], "`k` is used by `influence: huber` only", "write it into `psi`")
         if "influence" in r:
@@ -146,9 +142,7 @@ class FilterBuilder:
         if a.bad:
             return None
         if "probability" in a and "chi2" in a:
-            self.problems.add(
-                a.places["chi2"], "`probability` and `chi2` are given both", "remove one of them"
-            )
+            self.problems.add(a.places["chi2"], "`probability` and `chi2` are given both", "remove one of them")
         return Adaptive(a.get("probability"), a.get("chi2"))
 
     @staticmethod

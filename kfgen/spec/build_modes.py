@@ -83,7 +83,5 @@ def _states(builder: Builder, spec: Spec, f: Fields) -> tuple[State, ...]:
             found.append(replace(state, variance=builder.bad(state.place)))
             continue
         variance = builder.variance(fields, "P0" in f)
-        found.append(
-            replace(state, init=builder.formula(fields, "init"), variance=variance, place=fields.place)
-        )
+        found.append(replace(state, init=builder.formula(fields, "init"), variance=variance, place=fields.place))
     return tuple(found)

@@ -132,9 +132,7 @@ def truth(tree: Tree, names: Mapping[str, Value]) -> bool:
     if tree.op == "or":
         return truth(tree.args[0], names) or truth(tree.args[1], names)
     left, right = _value(tree.args[0], names), _value(tree.args[1], names)
-    return (
-        less(left, right, tree.op == "le") if tree.op in ("lt", "le") else less(right, left, tree.op == "ge")
-    )
+    return less(left, right, tree.op == "le") if tree.op in ("lt", "le") else less(right, left, tree.op == "ge")
 
 
 def less(a: Value, b: Value, or_equal: bool = False) -> bool:
@@ -192,10 +190,7 @@ def _power(base: Value, exponent: Value) -> Value:
         raise NoValue("the expression divides by zero", "write a divisor that is not 0")
     if whole:
         power = int(exponent)
-        small = (
-            is_exact(base)
-            and (base.numerator.bit_length() + base.denominator.bit_length()) * abs(power) < 16_000
-        )
+        small = is_exact(base) and (base.numerator.bit_length() + base.denominator.bit_length()) * abs(power) < 16_000
         return base**power if small else real(base) ** power
     if base < 0:
         raise NoValue("a negative number has no real power with this exponent", "use a whole exponent")

@@ -40,9 +40,7 @@ _OTHER_CALLS = {
 def parse(text: str, condition: bool = False) -> Tree:
     """The tree of an expression; `condition` where a comparison is asked for instead of a number."""
     if len(text) > MAX_LENGTH:
-        raise ExpressionError(
-            0, f"the expression is longer than {MAX_LENGTH} characters", "split it with `let`"
-        )
+        raise ExpressionError(0, f"the expression is longer than {MAX_LENGTH} characters", "split it with `let`")
     tree = _Parser(tokenize(text)).whole(condition)
     if _depth(tree) > MAX_DEPTH:
         raise ExpressionError(0, "the expression is nested too deeply", "split it with `let`")
@@ -212,9 +210,7 @@ class _Parser:
         name = token.text
         if name not in FUNCTIONS:
             hint = _OTHER_CALLS.get(name) or (
-                f"did you mean `{_OTHER_NAMES[name]}`?"
-                if name in _OTHER_NAMES
-                else did_you_mean(name, FUNCTIONS)
+                f"did you mean `{_OTHER_NAMES[name]}`?" if name in _OTHER_NAMES else did_you_mean(name, FUNCTIONS)
             )
             raise ExpressionError(token.offset, f"there is no function {short(name)}", hint)
         opening = self.take()

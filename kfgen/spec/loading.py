@@ -33,9 +33,7 @@ def load(path: str | Path) -> Spec:
         raise SpecError.at(place, "there is no such file", "check the path") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise SpecError.at(
-            place, f"the file cannot be read: {reason}", "check the path and its permissions"
-        ) from None
+        raise SpecError.at(place, f"the file cannot be read: {reason}", "check the path and its permissions") from None
     return loads(data, file)
 
 
@@ -52,9 +50,7 @@ def loads(text: str | bytes, file: str = "<spec>") -> Spec:
         line = before.count(b"\n") + 1
         column = len(before[before.rfind(b"\n") + 1 :].decode("utf-8", "replace")) + 1
         at = Place(file, line, column)
-        raise SpecError.at(
-            at, f"the byte 0x{data[error.start]:02x} is not UTF-8", "save the file as UTF-8"
-        ) from None
+        raise SpecError.at(at, f"the byte 0x{data[error.start]:02x} is not UTF-8", "save the file as UTF-8") from None
     # line ends of any system, and a byte-order mark, mean nothing
     content = content.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     return _loads(content, file, hashlib.sha256(data).hexdigest())

@@ -40,9 +40,7 @@ def wrong_name(name: str) -> tuple[str, str] | None:
         hint = "use ASCII letters, digits and underscores, beginning with a letter"
         return f"the name {short(name)} is not a C identifier", hint
     why = reserved(name)
-    return (
-        (f"the name `{name}` {why}", f"choose another one, such as `{name}_` or `{name}0`") if why else None
-    )
+    return (f"the name `{name}` {why}", f"choose another one, such as `{name}_` or `{name}0`") if why else None
 
 
 def check_name(name: str, place: Place, problems: Problems, headers: bool = False) -> None:
@@ -63,11 +61,7 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
         yield f"{upper}_{word}", "a status", own
     yield f"{upper}_H_INCLUDED", "the header guard", own
     functions = ["init", "predict", "set_state", "set_covariance", "get_covariance"]
-    types = (
-        ["t", "real_t", "status_t"]
-        + ["inputs_t"] * bool(spec.inputs)
-        + ["parameters_t"] * bool(spec.parameters)
-    )
+    types = ["t", "real_t", "status_t"] + ["inputs_t"] * bool(spec.inputs) + ["parameters_t"] * bool(spec.parameters)
     filters = [m.filter for m in spec.imm.modes] if spec.imm else [spec.filter]
     if any(f.covariance == "sqrt" for f in filters):
         functions += ["set_sqrt_covariance", "get_sqrt_covariance"]

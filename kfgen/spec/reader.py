@@ -78,11 +78,7 @@ def _refuse_control_characters(text: str, problems: Problems) -> None:
         if content.isprintable():
             continue
         for column, c in enumerate(content, 1):
-            if (
-                (c < " " and c not in "\t\r")
-                or "\x7f" <= c <= "\x9f"
-                or c in "\u2028\u2029\ufffe\uffff\ufeff"
-            ):
+            if (c < " " and c not in "\t\r") or "\x7f" <= c <= "\x9f" or c in "\u2028\u2029\ufffe\uffff\ufeff":
                 at = problems.at(line, column)
                 raise problems.stop(at, f"the character U+{ord(c):04X} may not stand in a spec", "remove it")
 
@@ -250,8 +246,7 @@ class _Composer:
                 first = seen[key.text]
                 self.problems.add(
                     at,
-                    f"the key {short(key.text)} stands twice"
-                    f" (first at line {first.line}, column {first.column})",
+                    f"the key {short(key.text)} stands twice (first at line {first.line}, column {first.column})",
                     "remove one of them",
                 )
                 continue

@@ -136,9 +136,7 @@ NOISE = Record(
     (
         *spread("Q", "noise, per step"),
         Key("density", Formula("Q"), "Power spectral density in unit^2/Hz; continuous form only."),
-        Key(
-            "root_density", Formula("Q"), "The root of the density, as in data sheets; continuous form only."
-        ),
+        Key("root_density", Formula("Q"), "The root of the density, as in data sheets; continuous form only."),
         UNIT,
         DOC,
     ),

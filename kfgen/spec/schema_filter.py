@@ -246,9 +246,7 @@ CODE = Record(
             "`none`: loops over static arrays; `auto`: by size.",
             "auto",
         ),
-        Key(
-            "flash", Budget(), "Bytes of flash (k = 1024), predicted for a Cortex-M4F: more is a build error."
-        ),
+        Key("flash", Budget(), "Bytes of flash (k = 1024), predicted for a Cortex-M4F: more is a build error."),
         Key("ram", Budget(), "Bytes of RAM, likewise."),
         Key("stack", Budget(), "Bytes of stack, likewise."),
         Key("log_likelihood", Flag(), "Keep the log-likelihood of the last update.", "false"),

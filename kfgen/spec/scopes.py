@@ -115,9 +115,7 @@ class Scopes:
             return [""]
         if path[0] not in REPLACEABLE or path[0] == "states":
             return ["", *(m.name for m in self.spec.imm.modes)] if everywhere else [""]
-        inheriting = [
-            m.name for m in self.spec.imm.modes if f"imm.modes.{m.name}.{path[0]}" not in self.walker.keys
-        ]
+        inheriting = [m.name for m in self.spec.imm.modes if f"imm.modes.{m.name}.{path[0]}" not in self.walker.keys]
         return (["", *inheriting]) if everywhere else (inheriting or [""])
 
     # --- formulas
@@ -196,9 +194,7 @@ class Scopes:
         order = [constant.name for constant in self.spec.constants]
         own = written.path[1]
         if name in order and own in order and order.index(name) >= order.index(own):
-            text = f"the constant {short(name)} is used " + (
-                "by itself" if name == own else "above its definition"
-            )
+            text = f"the constant {short(name)} is used " + ("by itself" if name == own else "above its definition")
             hint = "write a value" if name == own else f"move {short(name)} above {short(own)}"
             self._say(written, name, text, hint)
 

@@ -12,13 +12,9 @@ SCOPES: dict[str, frozenset[str]] = {
     "folded": frozenset({"constant", "fixed dt", "parameter"}),
     "f": frozenset({"constant", "parameter", "state", "input", "noise", "definition", "dt", "t"}),
     "Q": frozenset({"constant", "parameter", "state", "input", "definition", "dt", "t"}),
-    "h": frozenset(
-        {"constant", "parameter", "state", "input", "sensor noise", "definition", "fixed dt", "t"}
-    ),
+    "h": frozenset({"constant", "parameter", "state", "input", "sensor noise", "definition", "fixed dt", "t"}),
     "R": frozenset({"constant", "parameter", "state", "input", "definition", "fixed dt", "t"}),
-    "residual": frozenset(
-        {"constant", "parameter", "state", "input", "definition", "fixed dt", "t", "z", "h"}
-    ),
+    "residual": frozenset({"constant", "parameter", "state", "input", "definition", "fixed dt", "t", "z", "h"}),
     "psi": frozenset({"constant", "parameter", "fixed dt", "innovation"}),
 }
 

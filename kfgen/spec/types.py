@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from kfgen.errors import Place
+from kfgen.errors import NOWHERE, Place
 from kfgen.spec.tree import Expression
 
 Matrix = tuple[tuple[Expression, ...], ...]
@@ -61,7 +61,7 @@ class State:
     period: Expression | None = None  # angle: 2*pi; periodic: as written; real: None
     bounds: Range | None = None
     doc: str = ""
-    place: Place = Place()
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Noise:
     density: bool = False
     unit: str = ""
     doc: str = ""
-    place: Place = Place()
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Dynamics:
     integrator: str = "rk4"  # euler | midpoint | rk4 | exact
     substeps: int = 1
     Q: Mapping[str, Expression] | Matrix = field(default_factory=dict)  # diagonal by state, or the full matrix
-    place: Place = Place()
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Component:
     period: Expression | None = None
     residual: Expression | None = None  # in the names z, h (and all that h may use)
     doc: str = ""
-    place: Place = Place()
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class Sensor:
     gate: Gate | None = None
     partial: bool = False
     doc: str = ""
-    place: Place = Place()
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ class Filter:
     innovation_floor: Expression | None = None
     gain_limit: Expression | None = None
     consider: tuple[str, ...] = ()
-    place: Place = Place()
+    place: Place = NOWHERE
     places: Mapping[str, Place] = field(default_factory=dict)  # of the keys that were written
 
 
@@ -224,7 +224,7 @@ class Mode:
     dynamics: Dynamics
     measurements: tuple[Sensor, ...]
     filter: Filter
-    place: Place = Place()
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -233,7 +233,7 @@ class Imm:
     transition: Matrix
     mu0: tuple[Expression, ...]
     mu_floor: Expression
-    place: Place = Place()
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -260,5 +260,5 @@ class Spec:
     fixed: Fixed = Fixed()
     code: Code = Code()
     imm: Imm | None = None
-    place: Place = Place()
+    place: Place = NOWHERE
     places: Mapping[str, Place] = field(default_factory=dict)  # of the top-level keys that were written

@@ -248,15 +248,8 @@ class Walker:
         if not isinstance(node, Mapping):
             fields.bad = True
             if not isinstance(node, Bad):
-                keys = (
-                    ", ".join(f"{k.name}: ..." for k in shape.keys if k.required)
-                    or f"{shape.keys[0].name}: ..."
-                )
-                if not (
-                    isinstance(node, Scalar)
-                    and node.kind == "null"
-                    and not any(k.required for k in shape.keys)
-                ):
+                keys = ", ".join(f"{k.name}: ..." for k in shape.keys if k.required) or f"{shape.keys[0].name}: ..."
+                if not (isinstance(node, Scalar) and node.kind == "null" and not any(k.required for k in shape.keys)):
                     self.wrong(node, path, "a mapping", f"write {{{keys}}}")
                 else:
                     fields.bad = False  # `gyro:` alone: nothing is required
@@ -267,9 +260,7 @@ class Walker:
             inner = (*path, name.text)
             place = self.problems.at(name.line, name.column, path_text(inner))
             if key is None:
-                self.problems.add(
-                    place, f"unknown key {short(name.text)}", unknown_key_hint(name.text, known)
-                )
+                self.problems.add(place, f"unknown key {short(name.text)}", unknown_key_hint(name.text, known))
                 meant = _SYNONYMS.get(name.text) or suggestion(name.text, known) or ""
                 self.meant.add(path_text((*path, meant)))
                 if isinstance(value, Mapping):

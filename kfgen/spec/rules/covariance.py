@@ -72,9 +72,7 @@ def _initial(facts: Facts, model: Model) -> None:
             complete = False
             continue
         if len(pair) == 1:
-            facts.add(
-                place, f"this is the variance of {short(covariance.first)}", "write it as `var` of the state"
-            )
+            facts.add(place, f"this is the variance of {short(covariance.first)}", "write it as `var` of the state")
             complete = False
         elif pair in seen:
             text = f"the covariance of {short(covariance.first)} and {short(covariance.second)} stands twice"
@@ -88,9 +86,7 @@ def _initial(facts: Facts, model: Model) -> None:
         return
     rows = [[variances[a] if a == b else entries.get((a, b), Fraction(0)) for b in names] for a in names]
     place = facts.at(f"{model.prefix}covariances", "covariances")
-    _semidefinite(
-        facts, rows, place, "the initial covariance", "make the covariances smaller: |c| <= std1*std2"
-    )
+    _semidefinite(facts, rows, place, "the initial covariance", "make the covariances smaller: |c| <= std1*std2")
 
 
 def _process(facts: Facts, model: Model) -> None:
@@ -107,9 +103,7 @@ def _process(facts: Facts, model: Model) -> None:
     _noises(facts, model.noise, model.noise_covariance, path, model.context)
 
 
-def _noises(
-    facts: Facts, noises: tuple[Noise, ...], matrix: Matrix | None, path: str, context: Context
-) -> None:
+def _noises(facts: Facts, noises: tuple[Noise, ...], matrix: Matrix | None, path: str, context: Context) -> None:
     known = facts.known(context)
     for noise in noises:
         _variance(facts, noise.variance, known)
@@ -117,16 +111,12 @@ def _noises(
         return
     if not noises:
         if not facts.written(path.removesuffix("_covariance")):
-            facts.add(
-                facts.at(path), "`noise_covariance` is given, but there is no `noise`", "name the noises"
-            )
+            facts.add(facts.at(path), "`noise_covariance` is given, but there is no `noise`", "name the noises")
         return
     _matrix(facts, matrix, [noise.name for noise in noises], "noise", path, context, known)
 
 
-def _matrix(
-    facts: Facts, matrix: Matrix, names: list[str], of: str, path: str, context: Context, known: Known
-) -> None:
+def _matrix(facts: Facts, matrix: Matrix, names: list[str], of: str, path: str, context: Context, known: Known) -> None:
     """A full covariance: square, of the right size, symmetric, positive semidefinite where it is constant."""
     size = len(names)
     key = path.rpartition(".")[2]
@@ -155,14 +145,10 @@ def _matrix(
     for i in range(size):
         variance = values[i][i]
         if variance is not None and variance < 0:
-            facts.add(
-                matrix[i][i].place, f"the variance {show(variance)} is negative", "write a variance >= 0"
-            )
+            facts.add(matrix[i][i].place, f"the variance {show(variance)} is negative", "write a variance >= 0")
 
 
-def _symmetric(
-    facts: Facts, matrix: Matrix, values: list[list[Value]], context: Context, known: Known
-) -> bool:
+def _symmetric(facts: Facts, matrix: Matrix, values: list[list[Value]], context: Context, known: Known) -> bool:
     for i, row in enumerate(matrix):
         for j in range(i):
             a, b = values[i][j], values[j][i]
@@ -181,9 +167,7 @@ def _symmetric(
     return True
 
 
-def _probe(
-    facts: Facts, pair: tuple[Expression, Expression], context: Context, known: Known
-) -> list[Value | None]:
+def _probe(facts: Facts, pair: tuple[Expression, Expression], context: Context, known: Known) -> list[Value | None]:
     """The values of two formulas at a random point: equal formulas may be written differently."""
     draw = random.Random(1)
     point: Known = dict(known)

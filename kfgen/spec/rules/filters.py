@@ -67,9 +67,7 @@ def _consider(facts: Facts, model: Model) -> None:
     if len(set(chosen.consider)) < len(chosen.consider):
         facts.add(_place(chosen, "consider"), "a state stands twice in `consider`", "name each once")
     elif model.states and set(chosen.consider) >= {state.name for state in model.states}:
-        facts.add(
-            _place(chosen, "consider"), "no state is left to be estimated", "leave a state out of `consider`"
-        )
+        facts.add(_place(chosen, "consider"), "no state is left to be estimated", "leave a state out of `consider`")
     elif facts.empty(f"{chosen.place.path}.consider"):
         facts.add(_place(chosen, "consider"), "`consider` names no state", "name a state, or remove the key")
 
@@ -94,22 +92,35 @@ def _known(facts: Facts, model: Model) -> dict[str, Value]:
     return {**facts.known(model.context), **facts.folded}
 
 
+def _guilty(model: Model, expression: Expression, variables: frozenset[str]) -> str:
+    """The variables in which a formula is not linear, or which multiply each other."""
+    found = []
+    for name in sorted(variables & set(model.context.uses(expression))):
+        form = Affine(model.context, frozenset({name})).form(expression.tree)
+        if not form.affine or form.coefficients & variables:
+            found.append(short(name))
+    return ", ".join(found) or "states and noises"
+
+
 def _linear(facts: Facts, model: Model) -> None:
     hint = "choose `type: ekf`"
-    affine = Affine(model.context, _variables(model))
+    variables = _variables(model)
+    affine = Affine(model.context, variables)
     for name, expression in model.dynamics.f.items():
         if not _unknown(model, expression) and not affine.is_affine(expression.tree, _known(facts, model)):
             facts.add(
                 expression.place,
-                f"f of {short(name)} is not linear in states and noises, as a kf wants it",
+                f"f of {short(name)} is not linear in {_guilty(model, expression, variables)}, as a kf wants it",
                 hint,
             )
     for sensor in model.measurements:
-        affine = Affine(model.context, _variables(model, sensor))
+        variables = _variables(model, sensor)
+        affine = Affine(model.context, variables)
         for component in sensor.components:
             h = component.h
             if not _unknown(model, h) and not affine.is_affine(h.tree, _known(facts, model)):
-                text = f"h of {short(component.name)} is not linear in states and noises, as a kf wants it"
+                guilty = _guilty(model, h, variables)
+                text = f"h of {short(component.name)} is not linear in {guilty}, as a kf wants it"
                 facts.add(h.place, text, hint)
 
 
@@ -117,9 +128,7 @@ def _steady(facts: Facts, model: Model) -> None:
     """F, H, Q, R and the noises' variances must be constant."""
     place = _place(model.filter, "gain")
     if facts.spec.dt is not None and facts.spec.dt.run_time:
-        facts.add(
-            place, "`gain: steady` does not go with a run-time dt: the gain would vary", "write `dt: 0.1`"
-        )
+        facts.add(place, "`gain: steady` does not go with a run-time dt: the gain would vary", "write `dt: 0.1`")
         return
     for name, expression in model.dynamics.f.items():
         _constant_coefficients(facts, model, expression, None, f"f of {short(name)}")
@@ -174,9 +183,7 @@ def _constant(facts: Facts, model: Model, entries: list[Expression], key: str, w
     for entry in entries:
         varying = _varying(model, model.context.uses(entry))
         if varying:
-            facts.add(
-                entry.place, f"{what} varies with {varying}, but `{key}` wants it constant", "use constants"
-            )
+            facts.add(entry.place, f"{what} varies with {varying}, but `{key}` wants it constant", "use constants")
             return
 
 

@@ -105,14 +105,10 @@ def _sensors(facts: Facts, imm: Imm) -> None:
         for own, other in zip(mode.measurements, wanted, strict=True):
             if own.partial != other.partial:
                 at = facts.at(f"{own.place.path}.partial", otherwise=own.place)
-                facts.add(
-                    at, f"`partial` of {short(own.name)} differs between modes", "write the same in all"
-                )
+                facts.add(at, f"`partial` of {short(own.name)} differs between modes", "write the same in all")
             kinds = [(a.kind, b.kind) for a, b in zip(own.components, other.components, strict=True)]
             if any(a != b for a, b in kinds):
-                facts.add(
-                    own.place, f"`kind` in {short(own.name)} differs between modes", "write the same in all"
-                )
+                facts.add(own.place, f"`kind` in {short(own.name)} differs between modes", "write the same in all")
 
 
 def _shape(sensors: tuple[Sensor, ...]) -> list[tuple[str, list[str]]]:

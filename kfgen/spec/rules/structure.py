@@ -38,21 +38,10 @@ def _sections(facts: Facts) -> None:
 def _dynamics(facts: Facts, model: Model) -> None:
     dynamics = model.dynamics
     no_step = facts.spec.dt is None and not facts.written("dt")
-    if (
-        dynamics.form == "continuous"
-        and no_step
-        and not facts.scopes.said_dt
-        and "dt" not in facts.walker.meant
-    ):
-        facts.add(
-            dynamics.place, "`form: continuous` needs a step, but the spec has no key `dt`", "write `dt: 0.1`"
-        )
+    if dynamics.form == "continuous" and no_step and not facts.scopes.said_dt and "dt" not in facts.walker.meant:
+        facts.add(dynamics.place, "`form: continuous` needs a step, but the spec has no key `dt`", "write `dt: 0.1`")
     for noise in model.noise:
-        if (
-            noise.density
-            and dynamics.form != "continuous"
-            and not facts.broken(f"{dynamics.place.path}.form")
-        ):
+        if noise.density and dynamics.form != "continuous" and not facts.broken(f"{dynamics.place.path}.form"):
             path = noise.place.path
             at = facts.at(f"{path}.density", f"{path}.root_density", otherwise=noise.place)
             facts.add(at, "a density is used in continuous form only", "write `std` or `var` per step")
@@ -60,9 +49,7 @@ def _dynamics(facts: Facts, model: Model) -> None:
 
 def _sensor(facts: Facts, sensor: Sensor, model: Model) -> None:
     if not sensor.components and facts.empty(f"{sensor.place.path}.z"):
-        facts.add(
-            sensor.place, f"the sensor {short(sensor.name)} has no component", "write `z: {x: {h: ...}}`"
-        )
+        facts.add(sensor.place, f"the sensor {short(sensor.name)} has no component", "write `z: {x: {h: ...}}`")
     states = {state.name for state in facts.spec.states}
     doubtful = facts.scopes.doubtful
     for component in sensor.components:
@@ -71,9 +58,7 @@ def _sensor(facts: Facts, sensor: Sensor, model: Model) -> None:
         used = model.context.uses(component.h)
         unknown = [n for n in used if n not in model.context.kinds and n not in ("pi", "e", "dt", "t")]
         if not used & states and not unknown and not used & doubtful:
-            facts.add(
-                component.h.place, "h depends on no state, so it measures nothing", "write what is measured"
-            )
+            facts.add(component.h.place, "h depends on no state, so it measures nothing", "write what is measured")
         if component.residual is not None and component.residual.tree != BAD:
             _residual(facts, component.residual, model)
 

@@ -98,9 +98,7 @@ def _whole_numbers(facts: Facts) -> None:
             continue
         key = expression.place.path.rpartition(".")[2]
         if key == "kfgen" and number != 1:
-            facts.add(
-                expression.place, f"version {show(number)} of the language is not known", "write `kfgen: 1`"
-            )
+            facts.add(expression.place, f"version {show(number)} of the language is not known", "write `kfgen: 1`")
         elif number != apply("floor", [number]):
             facts.add(expression.place, f"`{key}` is {show(number)}", "write a whole number")
         elif number < shape.low or (shape.high is not None and number > shape.high):
@@ -121,9 +119,7 @@ def _step(facts: Facts) -> None:
     low = facts.check_range(step.minimum, "the smallest step", 0)
     high = facts.check_range(step.maximum, "the largest step", 0)
     if step.minimum and step.maximum and low is not None and high is not None and less(high, low):
-        facts.add(
-            step.maximum.place, f"`max` ({show(high)}) is smaller than `min` ({show(low)})", "swap them"
-        )
+        facts.add(step.maximum.place, f"`max` ({show(high)}) is smaller than `min` ({show(low)})", "swap them")
         return
     if step.minimum and nominal is not None and low is not None and less(nominal, low):
         text = f"`nominal` ({show(nominal)}) is smaller than `min` ({show(low)})"
@@ -148,9 +144,7 @@ def _ordered(facts: Facts, limits: Range | None, what: str) -> bool:
 
 def _ranges(facts: Facts) -> None:
     spec = facts.spec
-    ranges = (
-        [p.range for p in spec.parameters] + [i.range for i in spec.inputs] + [s.range for s in spec.states]
-    )
+    ranges = [p.range for p in spec.parameters] + [i.range for i in spec.inputs] + [s.range for s in spec.states]
     for limits in ranges:
         _ordered(facts, limits, "range")
     for state in spec.states:
