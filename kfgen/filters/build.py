@@ -13,6 +13,7 @@ from kfgen.filters import process
 from kfgen.filters.base import FilterCode
 from kfgen.filters.ekf import Ekf
 from kfgen.filters.full import Full
+from kfgen.filters.layout import Layout
 from kfgen.filters.numbers import is_zero
 from kfgen.filters.order import best_order
 from kfgen.filters.sensor import linearise
@@ -39,7 +40,7 @@ def build_filter(spec: Spec, epsilon: Fraction, taken: frozenset[str]) -> Filter
     update = spec.filter.update
     assert update is not None
     best = _order(model)
-    layout: Any = UD(n, update) if spec.filter.covariance == "ud" else Full(n, update, epsilon, best)
+    layout: Layout = UD(n, update) if spec.filter.covariance == "ud" else Full(n, update, epsilon, best)
     order = best if layout.reorders else list(range(n))
     code = Ekf(model, layout, order, epsilon).code(taken)
     return _with_tables(code)
@@ -65,10 +66,9 @@ def _check_measurements(model: Model) -> None:
 
 def linearise_rows(t: Trace, model: Model, sensor: Any) -> list[list[Any]]:
     """H alone, before decorrelation."""
-    m = len(sensor.h)
+    m, q = len(sensor.h), len(sensor.noises)
     plain = replace(
-        sensor, R=tuple(tuple(sympy.S.Zero for _ in range(m)) for _ in range(m)), noises=(), noise_covariance=(),
-        residual=(None,) * m,
+        sensor, R=((sympy.S.Zero,) * m,) * m, noise_covariance=((sympy.S.Zero,) * q,) * q, residual=(None,) * m,
     )  # fmt: skip
     return linearise(t, model, plain).rows
 

@@ -20,7 +20,9 @@ def packed(i: int, j: int) -> int:
 class Full:
     """Layout `full`, with the updates `joseph` and `standard`. A covariance is its rows; only i <= j is used."""
 
+    title = "full"
     reorders = False
+    group = 1
 
     def __init__(self, n: int, update: str, epsilon: Fraction, sequence: list[int]) -> None:
         self.n = n

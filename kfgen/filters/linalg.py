@@ -22,13 +22,23 @@ Vector = list[Number]
 Rows = list[list[Number]]
 
 
+def plus(a: Number, b: Number) -> Number:
+    """a + b, also where one of them is a structural zero of Python's."""
+    return b if is_zero(a) else a if is_zero(b) else a + b
+
+
+def times(a: Number, b: Number) -> Number:
+    """a b, also where one of them is a structural zero or one of Python's."""
+    if is_zero(a) or is_zero(b):
+        return 0
+    return b if is_one(a) else a if is_one(b) else a * b
+
+
 def dot(a: Vector, b: Vector) -> Number:
     """Sum of a_i b_i, without the terms that are zero."""
     total: Number = 0
     for x, y in zip(a, b, strict=True):
-        if not is_zero(x) and not is_zero(y):
-            product = y if is_one(x) else x if is_one(y) else x * y
-            total = product if is_zero(total) else total + product
+        total = plus(total, times(x, y))
     return total
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
 
 from kfgen.filters.base import CONST_KF, KF, Block
+from kfgen.filters.layout import Layout
 from kfgen.filters.numbers import select
 from kfgen.filters.ud import triangle
 from kfgen.ir.program import Argument, Function, Store
@@ -19,7 +19,7 @@ from kfgen.model.model import SensorModel
 class StateCode:
     """Traces the functions that do not depend on the algorithm."""
 
-    def __init__(self, model: Model, layout: Any, order: list[int], epsilon: Fraction) -> None:
+    def __init__(self, model: Model, layout: Layout, order: list[int], epsilon: Fraction) -> None:
         self.model = model
         self.layout = layout
         self.order = order

@@ -19,6 +19,7 @@ def packed(i: int, j: int) -> int:
 class UD:
     """Layout `ud`, with the updates `bierman` and `joseph`."""
 
+    title = "U D U^T"
     reorders = True
 
     def __init__(self, n: int, update: str) -> None:
@@ -124,6 +125,10 @@ class UD:
             D[i] = D1[i]
             U[i][:] = U1[i]
         return K, s
+
+    def tolerance(self, P: tuple[Rows, Vector], h: Vector) -> Value | int:
+        """None: a sum of D_j f_j^2 is not negative."""
+        return 0
 
     def limit(self, t: Trace, P: tuple[Rows, Vector], floors: list[Fraction | None], ceilings: list[Fraction | None]
               ) -> tuple[Rows, Vector]:  # fmt: skip
