@@ -19,8 +19,8 @@ def best_order(F: list[set[int]], noisy: set[int], measured: list[set[int]]) -> 
     n = len(F)
     columns = [{i for i in range(n) if k in F[i]} for k in range(n)]
 
-    def cost(order: list[int]) -> int:
-        return _cost(order, columns, noisy, measured)
+    def cost(order: list[int], limit: int = 1 << 60) -> int:
+        return _cost(order, columns, noisy, measured, limit)
 
     if n <= EXHAUSTIVE:
         return min((list(p) for p in permutations(range(n))), key=lambda p: (cost(p), p))
@@ -40,20 +40,26 @@ def best_order(F: list[set[int]], noisy: set[int], measured: list[set[int]]) -> 
                 swapped[i], swapped[j] = swapped[j], swapped[i]
                 for candidate in (moved, swapped) if i < j else (moved,):
                     left -= 1
-                    c = cost(candidate)
+                    c = cost(candidate, best_cost)
                     if c < best_cost:
                         best, best_cost, improved = candidate, c, True
     return best
 
 
-def _cost(order: list[int], columns: list[set[int]], noisy: set[int], measured: list[set[int]]) -> int:
+def _cost(order: list[int], columns: list[set[int]], noisy: set[int], measured: list[set[int]], limit: int) -> int:
+    """The cost of an order, or at least `limit` where it is no better."""
     position = {state: k for k, state in enumerate(order)}
     n = len(order)
     U = [0] * n  # bit i of U[j]: U_ij is not zero
     D = [state in noisy for state in order]
     total = 0
     reach = 0
+    for row in measured:
+        first = min(position[i] for i in row) if row else n
+        total += sum(PIVOT + ELEMENT * j for j in range(first, n))
     for state in order:
+        if total >= limit:
+            return total
         for i in columns[state]:
             reach |= 1 << position[i]
         w = reach  # column k of F U: all columns up to k, U being full above
@@ -69,7 +75,4 @@ def _cost(order: list[int], columns: list[set[int]], noisy: set[int], measured: 
                 D[j] = True
                 break
             w = (w & ~(1 << j)) | touched
-    for row in measured:
-        first = min(position[i] for i in row) if row else n
-        total += sum(PIVOT + ELEMENT * j for j in range(first, n))
     return total

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ DATA = ROOT.parent / "shared" / "data"
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     # one folder for all workers of a run: they share what they build
     base = tmp_path_factory.getbasetemp()
     with pytest.MonkeyPatch.context() as patch:
@@ -34,14 +34,13 @@ def build() -> Callable[..., NativeFilter]:
 
 
 @pytest.fixture(scope="session")
-def recorded() -> Callable[[NativeFilter], Log]:
-    """The recorded log of a filter's name; skips the test where the logs are not there."""
+def recorded() -> Callable[[NativeFilter, str], Log]:
+    """A recorded log, read for a filter; skips the test where the folder of logs is not there."""
 
-    def find(kf: NativeFilter, name: str | None = None) -> Log:
-        path = DATA / f"{name or kf.name}.csv"
-        if not path.exists():
-            pytest.skip(f"no {path.name} beside the repository")
-        return read(path, kf.spec)
+    def find(kf: NativeFilter, name: str) -> Log:
+        if not DATA.is_dir():
+            pytest.skip("the recorded logs are not beside the repository")
+        return read(DATA / f"{name}.csv", kf.spec)
 
     return find
 

@@ -17,7 +17,7 @@ def kf(build):
 
 @pytest.fixture(scope="module")
 def log(kf, recorded):
-    return recorded(kf)
+    return recorded(kf, "imu")
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_the_quaternion_keeps_its_length(result):
     length = np.linalg.norm(result.x[:, :4], axis=1)
     assert not result.counts(errors=True)
     assert np.all(np.abs(length - 1) < 0.005)  # measured: 0.0017, right after the first updates
-    assert np.all(np.abs(length[1000:] - 1) < 1e-3)
+    assert np.all(np.abs(length[1000:] - 1) < 1e-4)  # measured: 6e-6
 
 
 def test_down_is_where_the_accelerometer_feels_it(result, log):
@@ -76,7 +76,7 @@ def test_the_gyro_bias_is_that_of_the_rest(result, log):
         at_rest = log.columns[name][rest].mean()
         # measured: 0.3 mrad/s apart, 0.5 mrad/s of standard deviation
         assert abs(result.x[np.flatnonzero(rest)[-1], 4 + i] - at_rest) < 0.001
-    assert np.all(np.abs(result.x[2000:, 4:]) < 0.01)
+    assert np.all(np.abs(result.x[2000:, 4:]) < 0.01)  # measured: 0.0042
     assert np.all(np.sqrt(result.var[-1, 4:]) < 0.001)
 
 
@@ -84,20 +84,19 @@ def test_accepted_updates_are_consistent(result):
     for sensor, low, high in (("accel", 0.05, 0.8), ("mag", 0.02, 0.5)):
         status = result.calls[f"update_{sensor}"]
         nis = result.nis[sensor][status == 0] / 3
-        assert low < nis.mean() < high  # measured: 0.31 and 0.11: generous at rest, so that motion fits too
-        assert np.count_nonzero(status & Status.GATED) < 0.05 * status.size  # measured: 126 rows of 6000
+        assert low < nis.mean() < high  # measured: 0.32 and 0.11: room for motion
+        assert np.count_nonzero(status & Status.GATED) < 0.05 * status.size  # measured: 121, 7
 
 
 @pytest.mark.parametrize(
-    "q",
-    [(0.5, 1, 0, 0), (0.5, 0, 0, 1), (0.8, 0, 0, 1.57), (0, 1, 0, 0), (1, 0, 2, 0)],
-    ids=["tilted", "yawed", "east", "upside down", "nose down"],
+    ("axis", "degrees"), [("x", 60), ("x", 180), ("y", 115), ("z", 60), ("z", -90)], ids=lambda value: str(value)
 )
-def test_finds_the_attitude_from_a_wrong_start(kf, log, result, q):
+def test_finds_the_attitude_from_a_wrong_start(kf, log, result, axis, degrees):
     columns = {name: column[:1000] for name, column in log.columns.items()}
     kf.init()
     x = kf.x
-    x[:4] = np.array(q) / math.hypot(*q)
+    half = math.radians(degrees) / 2
+    x[:4] = [math.cos(half), *(math.sin(half) * (axis == each) for each in "xyz")]
     kf.set_state(x)
     found = kf.run(columns)
     # measured: within 2 degrees after 0.05 to 1.4 s

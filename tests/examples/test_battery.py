@@ -17,7 +17,7 @@ def kf(build):
 
 @pytest.fixture(scope="module")
 def log(kf, recorded):
-    return recorded(kf)
+    return recorded(kf, "battery")
 
 
 @pytest.fixture(scope="module")
@@ -43,32 +43,31 @@ def test_a_full_cell_is_recognised_at_once(kf, log, charge):
     assert np.all(np.abs(e[60:]) < 0.02)  # measured: 0.007
 
 
-@pytest.mark.parametrize("off", [-0.3, 0.3])
-@pytest.mark.parametrize("hour", [2, 3, 4, 5, 6])
-def test_finds_the_coulomb_count_again_on_the_plateau(kf, log, charge, hour, off):
-    start = 3600 * hour
-    if not 0 <= charge[start] + off <= 1:
-        pytest.skip("no such charge")
-    e, sigma = error(kf, log, charge, start, off)
-    assert abs(e[0]) == pytest.approx(0.3, abs=0.15)
-    assert np.all(np.abs(e[1800:]) < AFTER_HALF_AN_HOUR)
-    assert np.all(np.abs(e[3600:]) < AFTER_AN_HOUR)
-    assert np.all(np.abs(e[3600:]) < 6 * sigma[3600:])
+# the largest error allowed from so many seconds after the start on; measured: 0.17, 0.074, 0.028, 0.014
+BOUNDS = {60: 0.22, 600: 0.11, 1800: 0.045, 3600: 0.025}
 
 
-AFTER_HALF_AN_HOUR = 0.06
-AFTER_AN_HOUR = 0.03
+@pytest.mark.parametrize(
+    ("hour", "off"),
+    [*((hour, -0.3) for hour in range(1, 8)), *((hour, 0.3) for hour in range(3, 10))],
+)
+def test_finds_the_coulomb_count_again(kf, log, charge, hour, off):
+    """Starts from 0.84 down to 0.13 of charge, 0.3 wrong either way."""
+    e, sigma = error(kf, log, charge, 3600 * hour, off)
+    for seconds, bound in BOUNDS.items():
+        assert np.all(np.abs(e[seconds:]) < bound), f"after {seconds} s"
+    assert np.all(np.abs(e[3600:]) < 4 * sigma[3600:])  # measured: 2.5
 
 
 def test_follows_the_coulomb_count_to_the_end(kf, log, charge):
     e, sigma = error(kf, log, charge, 0, -0.3)
-    assert np.sqrt(np.mean(e[600:] ** 2)) < 0.004  # measured: 0.0015
-    assert np.all(np.abs(e[600:]) < 0.02)
-    assert np.all(sigma[600:] < 0.02)
+    assert np.sqrt(np.mean(e[600:] ** 2)) < 0.008  # measured: 0.0038
+    assert np.all(np.abs(e[600:]) < 0.02)  # measured: 0.0068
+    assert np.all(sigma[600:] < 0.02)  # measured: 0.0042
 
 
 def test_a_wrong_start_on_the_plateau_is_known_to_be_uncertain(kf, log, charge):
-    """Where 0.1 of charge is worth 1 mV a filter may not be sure of itself within a minute."""
+    """Where 1 % of charge is worth less than 1 mV, no filter may be sure of itself within a minute."""
     _, sigma = error(kf, log, charge, 14000, 0.0)
-    assert sigma[60] > 0.05
-    assert sigma[3600] < 0.03
+    assert sigma[60] > 0.05  # measured: 0.16
+    assert sigma[3600] < 0.03  # measured: 0.017

@@ -13,7 +13,7 @@ def kf(build):
 
 @pytest.fixture(scope="module")
 def log(kf, recorded):
-    return recorded(kf)
+    return recorded(kf, "gps")
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def satellites(log):
 
 
 def fix(positions, ranges):
-    """Position and clock error [4] of a single epoch, by Gauss-Newton: what a receiver does without a filter."""
+    """Position and clock error [4] of a single epoch, by by Gauss-Newton, without a filter."""
     x = np.zeros(4)
     for _ in range(20):
         line = positions - x[:3]

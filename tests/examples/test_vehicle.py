@@ -1,4 +1,4 @@
-"""specs/vehicle.yaml over 216 s of a drive through a town: 10,800 rows, fixes that repeat, drop and wander."""
+"""specs/vehicle.yaml over 216 s of a drive through a town: fixes that repeat, drop and wander."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def kf(build):
 
 @pytest.fixture(scope="module")
 def log(kf, recorded):
-    return recorded(kf)
+    return recorded(kf, "vehicle")
 
 
 def run(kf, columns, heading=0.0):
@@ -46,7 +46,7 @@ def test_fixes_are_as_uncertain_as_the_spec_says(kf, log):
     assert not result.counts(errors=True)
     nis = np.nanmean(result.nis["gnss"]) / 2
     assert 0.3 < nis < 3  # measured: 0.78
-    assert 0.05 < np.nanmean(result.nis["speed"]) < 1.5  # measured: 0.24; the errors wander, so std is generous
+    assert 0.05 < np.nanmean(result.nis["speed"]) < 1.5  # measured: 0.24
     # half a second around t = 29 s, where the fixes jump and pull the speed along
     assert np.count_nonzero(result.calls["update_speed"] & Status.GATED) < 50  # measured: 10
     assert np.count_nonzero(result.calls["update_gnss"] & Status.GATED) == 0
@@ -71,11 +71,7 @@ def test_the_hard_gap_is_found_back_from(kf, log):
     assert np.count_nonzero(result.calls["update_gnss"] & Status.ANOMALY) > 0
     whole = run(kf, log)
     away = np.hypot(*(result.x - whole.x)[:, :2].T)
-    assert np.all(away[log.columns["t"] > AGAIN] < 5)
-
-
-# s: when it is within 5 m of the run without the gap again
-AGAIN = 190
+    assert np.all(away[log.columns["t"] > 190] < 5)  # measured: from 177.3 s on
 
 
 @pytest.mark.parametrize("heading", [-2.0, -1.0, 1.0, 2.0, 3.0])
@@ -97,10 +93,10 @@ def test_heading_agrees_with_the_course_of_the_fixes(kf, log):
     course = np.arctan2(north[2 * k :] - north[: -2 * k], east[2 * k :] - east[: -2 * k])
     straight = (speed[k:-k] > 8) & (angle(heading[2 * k :], heading[: -2 * k]) < 0.1)
     assert straight.sum() > 1000
-    assert np.median(angle(course, heading[k:-k])[straight]) < 0.1
+    assert np.median(angle(course, heading[k:-k])[straight]) < 0.1  # measured: 0.027
 
 
 def test_the_gyro_bias_stays_plausible(kf, log):
     result = run(kf, log)
-    assert np.all(np.abs(result.x[:, 4]) < 0.02)
-    assert np.sqrt(result.var[-1, 4]) < 0.002
+    assert np.all(np.abs(result.x[:, 4]) < 0.015)  # measured: 0.0047 rad/s
+    assert np.sqrt(result.var[-1, 4]) < 0.001  # measured: 0.00023
