@@ -9,6 +9,12 @@ import mpmath
 from kfgen.ir.constants import to_fraction, to_mpf
 
 
+def log_two_pi() -> Fraction:
+    """ln(2 pi)."""
+    with mpmath.workdps(60):
+        return to_fraction(mpmath.log(2 * mpmath.pi))
+
+
 def chi2_quantile(probability: Fraction, degrees: int) -> Fraction:
     """x with P(chi-square of `degrees` degrees of freedom <= x) = probability, 0 < probability < 1.
 

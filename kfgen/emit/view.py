@@ -169,7 +169,7 @@ class _ViewMaker:
                 Named(s.name, _about(s.unit, s.doc), index_name=f"{self.NAME}_{s.name.upper()}") for s in spec.states
             ], "index_name", 1),
             state_table=tuple(_columns([
-                [s.name, f"[{_safe(s.unit)}]" if s.unit else "", {"real": "", "angle": "angle", "periodic": "periodic"}[s.kind],
+                [s.name, f"[{_safe(s.unit)}]" if s.unit else "", "" if s.kind == "real" else s.kind,
                  _safe(" ".join(s.doc.split()))]
                 for s in spec.states
             ])),

@@ -18,13 +18,13 @@ from kfgen.filters.base import DT, INPUTS, KF, FilterCode, sensor_argument
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.numbers import assume_nonnegative, is_nonnegative, is_positive, is_zero
 from kfgen.filters.sensor import Innovation, linearise, needs_inputs, permuted
-from kfgen.filters.state import StateCode
+from kfgen.filters.state import StateCode, counts_gated
 from kfgen.ir.program import Argument, Function, Store
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
-from kfgen.quantiles import chi2_quantile
+from kfgen.quantiles import chi2_quantile, log_two_pi
 
 # Measured with gcc 12 on a Cortex-M4F: its schedulers lengthen live ranges, and what no longer fits the registers
 # costs two instructions each time.
@@ -104,7 +104,9 @@ class Ekf:
         length = "a step of dt" if model.dt is None else f"one step of {float(model.dt):.6g} s"
         if model.spec.dt is None:
             length = "one step"
-        return Function("predict", arguments, schedule(t, taken), f"Advance the estimate by {length}.")
+        return Function(
+            "predict", arguments, schedule(t, taken | {a.name for a in arguments}), f"Advance the estimate by {length}."
+        )
 
     # update ------------------------------------------------------------------------------------------
 
@@ -135,13 +137,33 @@ class Ekf:
             # A far outlier may overflow nis and is gated all the same: z is tested by itself, and first.
             self._guard_finite(t, [*innovation.y, *result.s])
             self._guard_positive(t, result.failures)
-            gate = t.value(chi2_quantile(sensor.gate, len(sensor.h)))
-            t.guard(result.nis > gate, "GATED", before=[Store("kf.nis", None, result.nis.node)])
+            self._gate(t, sensor, result.nis)
             self._guard_finite(t, [result.nis, *x, *self.layout.evidence(P, after_predict=False)])
         self._store(t, x, set(range(len(x))), P, after_predict=False)
+        if counts_gated(model, sensor):
+            t.store(f"kf.gate_count_{sensor.name}", None, t.wrapped(t.pool.integer(0)))
         t.store("kf.nis", None, result.nis)
+        if model.spec.code.log_likelihood:
+            t.store("kf.log_likelihood", None, result.log_likelihood)
         what = f"Take a measurement of {sensor.name} into account."
-        return Function(f"update_{sensor.name}", arguments, schedule(t, taken), what)
+        return Function(f"update_{sensor.name}", arguments, schedule(t, taken | {a.name for a in arguments}), what)
+
+    def _gate(self, t: Trace, sensor: SensorModel, nis: Value) -> None:
+        """End the update where nis exceeds its quantile; after reset_after rejections take it all the same."""
+        assert sensor.gate is not None
+        t.section("gate")
+        fails = nis > t.value(chi2_quantile(sensor.gate, len(sensor.h)))
+        before = [Store("kf.nis", None, nis.node)]
+        limit = sensor.spec.gate.reset_after if sensor.spec.gate is not None else None
+        if counts_gated(self.model, sensor):
+            count = t.wrapped(t.pool.make("field", (), f"kf.gate_count_{sensor.name}", "int"))
+            before.append(Store(f"kf.gate_count_{sensor.name}", None, (count + 1).node))
+            if limit is not None:
+                fails = t.wrapped(t.pool.both(fails.node, (count < limit).node))
+                t.guard(fails, "GATED", before=before)
+                t.flag(nis > t.value(chi2_quantile(sensor.gate, len(sensor.h))), "ANOMALY")
+                return
+        t.guard(fails, "GATED", before=before)
 
     def _sequence(self, t: Trace, sensor: SensorModel, innovation: Innovation) -> _Updated:
         """All components, one scalar measurement after another."""
@@ -151,6 +173,7 @@ class Ekf:
         rows, variances, y = innovation.rows, innovation.variances, innovation.y
         names = [c.name for c in sensor.spec.components]
         nis: Any = 0
+        likelihood: Any = 0  # -2 log
         every_s: list[Value] = []
         failures: list[Value] = []
         for first in range(0, len(rows), layout.group):
@@ -170,6 +193,10 @@ class Ekf:
                     square = t.select(variance > 0, square, 0)
                     failures.append(variance < -low)
                 nis = linalg.plus(nis, square)
+                if self.model.spec.code.log_likelihood:
+                    term = square + t.function("log", variance) + t.value(log_two_pi())
+                    known = is_positive(variances[c])
+                    likelihood = linalg.plus(likelihood, term if known else t.select(variance > 0, term, 0))
                 every_s.append(variance)
         t.section("state and innovation squared")
         nis = t.name(nis, "nis")
@@ -177,7 +204,8 @@ class Ekf:
         for place, m in zip(self.order, moved, strict=True):
             prior = t.element("kf.x", place)
             x[place] = t.name(linalg.plus(prior, m), f"{self.model.states[place]}_next")
-        return _Updated(x, P, nis, every_s, failures)
+        likelihood = t.value(likelihood) * Fraction(-1, 2)
+        return _Updated(x, P, nis, every_s, failures, likelihood)
 
     # ends --------------------------------------------------------------------------------------------
 
@@ -220,3 +248,4 @@ class _Updated:
     nis: Value
     s: list[Value]
     failures: list[Value]
+    log_likelihood: Value

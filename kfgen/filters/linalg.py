@@ -188,7 +188,7 @@ def gram_schmidt(rows: Rows, weights: Vector) -> tuple[Rows, Vector]:
 
 
 def udu(P: Rows) -> tuple[Rows, Vector]:
-    """U, D of a symmetric positive semidefinite matrix; its upper triangle is read. A zero pivot gives a zero column."""
+    """U, D of a symmetric positive semidefinite matrix (upper triangle read). A zero pivot gives a zero column."""
     n = len(P)
     P = [list(row) for row in P]
     U = zeros(n, n)

@@ -16,6 +16,12 @@ from kfgen.model import Model
 from kfgen.model.model import SensorModel
 
 
+def counts_gated(model: Model, sensor: SensorModel) -> bool:
+    """Whether the filter counts the sensor's rejections: where it is asked to, or has to."""
+    gate = sensor.spec.gate
+    return gate is not None and (model.spec.code.gate_count or gate.reset_after is not None)
+
+
 class StateCode:
     """Traces the functions that do not depend on the algorithm."""
 
@@ -41,6 +47,12 @@ class StateCode:
                 out.append(Block("t_lost", None, "what the sum of t has rounded away [s]"))
         if model.spec.initialize is not None:
             out.append(Block("initialized", None, "the first measurement has set the state", kind="bool"))
+        for sensor in model.sensors:
+            if counts_gated(model, sensor):
+                doc = f"measurements of {sensor.name} refused in a row"
+                out.append(Block(f"gate_count_{sensor.name}", None, doc, kind="uint32"))
+        if model.spec.code.log_likelihood:
+            out.append(Block("log_likelihood", None, "of the last update"))
         out.append(Block("nis", None, "normalised innovation squared of the last update"))
         return out
 
@@ -97,7 +109,7 @@ class StateCode:
         return Function(
             "init",
             [KF],
-            schedule(t, taken),
+            schedule(t, taken | {"x", "P"}),
             "Set the state, its covariance and the parameters to their initial values.",
         )
 
@@ -113,7 +125,7 @@ class StateCode:
         return Function(
             "set_state",
             [KF, argument],
-            schedule(t, taken),
+            schedule(t, taken | {"x", "P"}),
             "Replace the state; angles are wrapped, the covariance stays.",
         )
 
@@ -135,7 +147,7 @@ class StateCode:
         return Function(
             "get_covariance",
             [CONST_KF, argument],
-            schedule(t, taken),
+            schedule(t, taken | {"x", "P"}),
             "The covariance of the state, in the order of the states.",
             returns="void",
         )
@@ -171,7 +183,10 @@ class StateCode:
             doc="covariance, row-major; the upper triangle is read",
         )
         return Function(
-            "set_covariance", [KF, argument], schedule(t, taken), "Replace the covariance; the state stays."
+            "set_covariance",
+            [KF, argument],
+            schedule(t, taken | {"x", "P"}),
+            "Replace the covariance; the state stays.",
         )
 
     def _factor(self, t: Trace, P: Array, W: Array) -> None:

@@ -34,7 +34,7 @@ class UD:
         flat = tuple(Fraction(U[i][j]) for j in range(n) for i in range(j))
         out = []
         if n > 1:
-            out.append(Block("U", n * (n - 1) // 2, "unit upper triangular factor, strictly upper part column by column",
+            out.append(Block("U", n * (n - 1) // 2, "unit upper triangular factor, strict upper triangle by columns",
                              initial=flat))  # fmt: skip
         out.append(Block("D", n, "diagonal factor: P = U D U^T", initial=tuple(Fraction(d) for d in D)))
         return out

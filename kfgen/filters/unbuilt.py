@@ -38,13 +38,10 @@ def unbuilt(spec: Spec) -> list[Mistake]:
     code = spec.code
     for key, wanted in {
         "unroll": code.unroll == "none", "flash": code.flash, "ram": code.ram, "stack": code.stack,
-        "log_likelihood": code.log_likelihood, "gate_count": code.gate_count,
     }.items():  # fmt: skip
         if wanted:
             refuse(code.places.get(key, spec.place), f"code.{key}", "leave it out")
     for sensor in spec.measurements:
         if sensor.partial:
             refuse(sensor.place, f"partial (sensor {sensor.name})", "leave it out")
-        if sensor.gate is not None and sensor.gate.reset_after is not None:
-            refuse(sensor.place, f"gate.reset_after (sensor {sensor.name})", "leave it out")
     return out
