@@ -12,6 +12,7 @@ from kfgen.filters.numbers import (
     Number,
     assume_nonnegative,
     assume_positive,
+    is_negligible,
     is_one,
     is_positive,
     is_zero,
@@ -193,9 +194,11 @@ def udu(P: Rows) -> tuple[Rows, Vector]:
     P = [list(row) for row in P]
     U = zeros(n, n)
     D: Vector = [0] * n
+    scale = [P[j][j] for j in range(n)]
     for j in reversed(range(n)):
         D[j] = P[j][j]
-        if is_zero(D[j]):
+        if is_zero(D[j]) or is_negligible(D[j], scale[j]):
+            D[j] = 0
             continue
         for i in range(j):
             if not is_zero(P[i][j]):

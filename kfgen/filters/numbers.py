@@ -101,3 +101,16 @@ def _derive(trace: Trace, node: Node) -> int:
             return max(signs) if max(signs) == 2 else 1 if max(signs) else 0
         case _:
             return 0
+
+
+def is_negligible(pivot: Number, scale: Number) -> bool:
+    """Whether an exactly known pivot is zero but for the digits of its matrix.
+
+    The matrices of a spec were found to be positive semidefinite up to 1e-8 of their diagonal (numbers written in
+    decimals), or to 60 digits (numbers computed from constants).
+    """
+    exact = pivot.constant if isinstance(pivot, Value) else pivot
+    whole = scale.constant if isinstance(scale, Value) else scale
+    if not isinstance(exact, Fraction) or not isinstance(whole, Fraction):
+        return False
+    return Fraction(-1, 10**7) * whole <= exact < Fraction(1, 10**30) * whole

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+
+# the matrices are small: threads of the linear algebra library only wait for each other, where tests run in
+# parallel for a hundred times as long
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
 from collections.abc import Callable, Iterator
 from pathlib import Path
 

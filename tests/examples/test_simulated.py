@@ -22,9 +22,9 @@ from kfgen.simulate import simulate
     ],
 )
 def test_the_covariance_is_the_error(build, consistency, name, low, high):
-    nees, nis = consistency(build(name), steps=100, seeds=40)
-    assert low < nees < high  # measured: 1.26, 1.06, 1.25
-    assert 0.93 < nis < 1.07  # measured: 0.975, 0.975, 0.982
+    nees, nis = consistency(build(name), steps=50, seeds=40)
+    assert low < nees < high  # measured: 0.97, 1.01, 1.18
+    assert 0.9 < nis < 1.1  # measured: 0.962, 0.987, 0.986
 
 
 def test_scalar_settles_where_its_comment_says(build):
@@ -62,13 +62,13 @@ def test_cv2d_bridges_irregular_pictures(build):
     """Half the pictures lost, errors still within what the filter says of itself."""
     kf = build("cv2d")
     squares = []
-    for seed in range(20):
+    for seed in range(12):
         log = simulate(kf.spec, 100, seed=seed, gaps=0.5)
         kf.init()
         result = kf.run(log)
         error = result.x - np.column_stack([log.columns[f"true.{name}"] for name in kf.states])
         squares.append(np.mean(error[1:] ** 2 / result.var[1:]))
-    assert 0.75 < np.mean(squares) < 1.4  # measured: 1.07, with a deviation of 0.08
+    assert 0.7 < np.mean(squares) < 1.5  # measured: 1.12, with a deviation of 0.11
 
 
 def test_the_tutorial_tracks_a_vehicle(build):
@@ -76,7 +76,7 @@ def test_the_tutorial_tracks_a_vehicle(build):
     Hence the claims are on the position, and are medians."""
     kf = build("vehicle_tutorial")
     nis, position, share = [], [], []
-    for seed in range(40):
+    for seed in range(24):
         log = simulate(kf.spec, 100, seed=seed)
         kf.init()
         result = kf.run(log)
@@ -85,6 +85,6 @@ def test_the_tutorial_tracks_a_vehicle(build):
         position.append(np.mean(error[20:, :2] ** 2))
         share.append(np.mean(error[20:, :2] ** 2 / result.var[20:, :2]))
         assert not result.counts(errors=True)
-    assert 0.9 < np.median(nis) < 1.4  # measured: 1.16
+    assert 0.9 < np.median(nis) < 1.4  # measured: 1.18
     assert math.sqrt(np.median(position)) < 0.805  # 1.394/sqrt(3): a single measurement; measured: 0.75
-    assert 0.8 < np.median(share) < 1.4  # measured: 1.06
+    assert 0.8 < np.median(share) < 1.4  # measured: 1.05
