@@ -65,6 +65,11 @@ class Printer:
                 return f"({self.scalar.c_type}){e(node.args[0], _ATOM)}", _UNARY
             case "half":
                 return f"{e(node.args[0], _PRODUCT)} / 2", _PRODUCT
+            case "slope":
+                return f"{self.tables[node.data]}_slope[{e(node.args[0])}]", _ATOM
+            case "table":
+                name, i = self.tables[node.data], e(node.args[0])
+                return f"{name}_y[{i}] + {name}_slope[{i}] * ({e(node.args[1])} - {name}_x[{i}])", _SUM
             case "add":
                 return f"{e(node.args[0], _SUM)} + {e(node.args[1], _PRODUCT)}", _SUM
             case "sub":
@@ -111,15 +116,9 @@ class Printer:
             self.helpers.add(op)
             if op == "wrap":
                 args.append(self.scalar.literal(node.data / 2))
-            elif op in ("table", "slope"):
-                name = self.tables[node.data]
-                args += [
-                    f"{name}_x",
-                    f"{name}_y" if op == "table" else "",
-                    f"{name}_slope",
-                    str(len(node.data.x)),
-                ]
-            return f"{self.prefix}_{op}({', '.join(a for a in args if a)})"
+            elif op == "segment":
+                args += [f"{self.tables[node.data]}_x", str(len(node.data.x))]
+            return f"{self.prefix}_{op}({', '.join(args)})"
         return f"{self.scalar.function(op)}({', '.join(args)})"
 
     def _sum(self, node: Node) -> tuple[str, int]:

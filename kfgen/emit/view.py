@@ -12,10 +12,9 @@ import sympy
 from kfgen.emit.printer import WIDTH, Printer
 from kfgen.filters.base import Block, FilterCode
 from kfgen.ir.count import operations
-from kfgen.ir.program import Argument, Flag, Function, walk
+from kfgen.ir.program import Argument, Flag, Function, Guard, walk
 from kfgen.ir.schedule import LIBRARY_NAMES
 from kfgen.scalars import Scalar
-from kfgen.scalars.floating import slopes
 
 STATUSES = (
     ("OK", 0x000, ""),
@@ -189,7 +188,7 @@ class _ViewMaker:
             ),
             functions=functions,
             constants=tuple(
-                Data(name=key, comment="inner position -> index into x", size=len(values),
+                Data(name=f"{self.name}_{key}", comment="inner position -> index into x", size=len(values),
                      values="{ " + ", ".join(map(str, values)) + " }")
                 for key, values in code.constants.items()
             ),
@@ -315,6 +314,7 @@ class _ViewMaker:
 
     def outcome(self, f: Function) -> str:
         flags = sorted({s.flag for s in walk(f.body) if isinstance(s, Flag)})
+        flags += sorted({s.status for s in walk(f.body) if isinstance(s, Guard) and s.status == "GATED"})
         text = f"{self.NAME}_OK" + "".join(f", {self.NAME}_{flag}" for flag in flags)
         return (
             f"{text}, or an error that leaves *kf as it was"
@@ -332,7 +332,7 @@ class _ViewMaker:
     def table_data(self) -> list[Data]:
         out = []
         for table, name in self.tables.items():
-            for suffix, values in (("x", table.x), ("y", table.y), ("slope", tuple(slopes(table)))):
+            for suffix, values in (("x", table.starts()), ("y", table.values()), ("slope", table.slopes())):
                 text = ", ".join(self.scalar.literal(v) for v in values)
                 out.append(Data(name=f"{name}_{suffix}", size=len(values), lines=tuple(_fill(text, WIDTH - 6))))
         return out

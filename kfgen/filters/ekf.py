@@ -223,7 +223,7 @@ class Ekf:
 
     def _guard_finite(self, t: Trace, values: list[Value]) -> None:
         """One test for all: a sum is finite only if its terms are."""
-        live = [v for v in values if v.constant is None]
+        live = list({v.node: v for v in values if v.constant is None}.values())
         if live:
             t.guard(~t.finite(sum(live[1:], live[0])), "NOT_FINITE")
 

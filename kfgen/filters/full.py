@@ -8,7 +8,7 @@ from kfgen.filters import linalg
 from kfgen.filters.base import Block
 from kfgen.filters.linalg import Rows, Symmetric, Vector
 from kfgen.filters.numbers import is_positive, is_zero, select, sqrt
-from kfgen.filters.ud import triangle
+from kfgen.filters.ud import column
 from kfgen.ir.trace import Array, Trace, Value
 
 
@@ -123,7 +123,7 @@ class Full:
 
     def get(self, t: Trace, i: Value, j: Value) -> Value:
         """P_ij for counters i <= j."""
-        return t.element("kf.P", triangle(j) + j + i)
+        return t.element("kf.P", column(j) + i)
 
     def put(self, t: Trace, P: Array, factors: Array) -> None:
         """Store a covariance (upper triangle column by column) whose factors are known to be positive."""

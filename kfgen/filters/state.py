@@ -8,7 +8,7 @@ from fractions import Fraction
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.layout import Layout
 from kfgen.filters.numbers import select
-from kfgen.filters.ud import triangle
+from kfgen.filters.ud import column
 from kfgen.ir.program import Argument, Function, Store
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
@@ -39,6 +39,13 @@ class StateCode:
         x0 = tuple(_wrapped(v, period) for v, period in zip(model.x0, model.periods, strict=True))
         out = [Block("x", self.n, "state", initial=x0)]
         out += self.layout.blocks(P0)
+        out.append(Block("nis", None, "normalised innovation squared of the last update"))
+        for sensor in model.sensors:
+            if counts_gated(model, sensor):
+                doc = f"measurements of {sensor.name} refused in a row"
+                out.append(Block(f"gate_count_{sensor.name}", None, doc, kind="uint32"))
+        if model.spec.code.log_likelihood:
+            out.append(Block("log_likelihood", None, "of the last update"))
         if model.uses_time():
             if model.dt is not None or model.spec.dt is None:
                 out.append(Block("steps", None, "predictions since init", kind="uint32"))
@@ -47,13 +54,6 @@ class StateCode:
                 out.append(Block("t_lost", None, "what the sum of t has rounded away [s]"))
         if model.spec.initialize is not None:
             out.append(Block("initialized", None, "the first measurement has set the state", kind="bool"))
-        for sensor in model.sensors:
-            if counts_gated(model, sensor):
-                doc = f"measurements of {sensor.name} refused in a row"
-                out.append(Block(f"gate_count_{sensor.name}", None, doc, kind="uint32"))
-        if model.spec.code.log_likelihood:
-            out.append(Block("log_likelihood", None, "of the last update"))
-        out.append(Block("nis", None, "normalised innovation squared of the last update"))
         return out
 
     def confined(self, t: Trace, x: list[Value]) -> list[Value]:
@@ -133,7 +133,7 @@ class StateCode:
         """From an inner position to the state of the spec."""
         if self.order == list(range(self.n)):
             return lambda i: i
-        return lambda i: t.wrapped(t.pool.make("element", (i.node,), "order", "int"))
+        return lambda i: t.wrapped(t.pool.make("element", (i.node,), f"{self.model.spec.name}_order", "int"))
 
     def get_covariance(self, taken: frozenset[str]) -> Function:
         """P, row-major, in the spec's order."""
@@ -166,7 +166,7 @@ class StateCode:
             if self.order == list(range(n)):
                 low, high = a, b
             value = t.name(t.element("P", low * n + high), "value")
-            k = triangle(j) + j + i
+            k = column(j) + i
             P[k] = value
             W[k] = value
             total.set(total.get() + value)
@@ -197,7 +197,7 @@ class StateCode:
         n = self.n
         tolerance = n * self.epsilon
         with t.loop("j", 0, n, down=True) as j:
-            jj = triangle(j) + j
+            jj = column(j)
             scale = t.name(P[jj + j] * tolerance, "round_off")
             pivot = t.name(W[jj + j], "pivot")
             t.guard(pivot < -scale, "NOT_POSITIVE")
@@ -205,11 +205,11 @@ class StateCode:
             W[jj + j] = d
             with t.loop("i", 0, j, down=True) as i:  # what is above i in column j is still P's
                 rest = t.name(W[jj + i], "rest")
-                allowed = 4 * scale * P[triangle(i) + i + i]
+                allowed = 4 * scale * P[column(i) + i]
                 t.guard((d <= 0) & (rest * rest > allowed), "NOT_POSITIVE")
                 u = t.name(select(d > 0, rest / d, 0), "u")
                 with t.loop("k", 0, i + 1) as k:
-                    spot = triangle(i) + i + k
+                    spot = column(i) + k
                     W[spot] = W[spot] - u * W[jj + k]
                 W[jj + i] = u
 

@@ -179,11 +179,17 @@ class UD:
         with t.loop("j", 0, self.n) as j:
             if self.n > 1:
                 with t.loop("i", 0, j) as i:
-                    t.store("kf.U", triangle(j) + i, factors[triangle(j) + j + i])
-            t.store("kf.D", j, factors[triangle(j) + j + j])
+                    t.store("kf.U", triangle(j) + i, factors[column(j) + i])
+            t.store("kf.D", j, factors[column(j) + j])
 
 
 def triangle(j: Value) -> Value:
     """j (j - 1) / 2: where column j of a strictly upper triangle starts."""
     t = j.trace
     return t.wrapped(t.pool.make("half", ((j * (j - 1)).node,), kind="int"))
+
+
+def column(j: Value) -> Value:
+    """j (j + 1) / 2: where column j of an upper triangle starts."""
+    t = j.trace
+    return t.wrapped(t.pool.make("half", ((j * (j + 1)).node,), kind="int"))

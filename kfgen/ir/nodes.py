@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 from kfgen.ir import constants
@@ -27,10 +28,25 @@ ARITHMETIC = ("add", "sub", "mul", "div", "neg")
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Data of a piecewise linear function: abscissae ascending, and values."""
+    """A piecewise linear function through n points, abscissae ascending, constant beyond the ends.
+
+    It has n + 1 segments: before the first point, between points, from the last point on.
+    """
 
     x: tuple[Fraction, ...]
     y: tuple[Fraction, ...]
+
+    def starts(self) -> tuple[Fraction, ...]:
+        """Where each segment's line is anchored."""
+        return (self.x[0], *self.x)
+
+    def values(self) -> tuple[Fraction, ...]:
+        return (self.y[0], *self.y)
+
+    def slopes(self) -> tuple[Fraction, ...]:
+        points = list(zip(self.x, self.y, strict=True))
+        inner = ((y1 - y0) / (x1 - x0) for (x0, y0), (x1, y1) in pairwise(points))
+        return (Fraction(0), *inner, Fraction(0))
 
 
 class Node:
@@ -114,6 +130,8 @@ class Pool:
             return self.sub(a, b.args[0])
         if a.op == "neg":
             return self.sub(b, a.args[0])
+        if cb is not None and cb < 0:
+            return self.sub(a, self.make("const", (), -cb, a.kind))
         return self._commutative("add", a, b)
 
     def sub(self, a: Node, b: Node) -> Node:
@@ -128,19 +146,18 @@ class Pool:
             return self.make("const", (), Fraction(0), a.kind)
         if b.op == "neg":
             return self.add(a, b.args[0])
+        if a.op == "neg":  # -a - b: the sign goes outside, so that a + b is shared
+            return self.neg(self.add(a.args[0], b))
         if cb is not None and cb < 0:
             return self.add(a, self.make("const", (), -cb, a.kind))
-        return self.make("sub", (a, b), kind=a.kind)
+        opposite = self._nodes.get(("sub", (b.serial, a.serial), None, a.kind))
+        return self.neg(opposite) if opposite is not None else self.make("sub", (a, b), kind=a.kind)
 
     def neg(self, a: Node) -> Node:
         if a.constant is not None:
             return self.make("const", (), -a.constant, a.kind)
         if a.op == "neg":
             return a.args[0]
-        if a.op == "sub":
-            return self.sub(a.args[1], a.args[0])
-        if a.op == "mul" and a.args[0].constant is not None:
-            return self.mul(self.constant(-a.args[0].constant), a.args[1])
         return self.make("neg", (a,), kind=a.kind)
 
     def mul(self, a: Node, b: Node) -> Node:
@@ -154,12 +171,12 @@ class Pool:
                 return a
             if ca == 1:
                 return b
-            if ca == -1:
-                return self.neg(b)
+            if ca < 0:  # constants are positive, so that what differs in sign only is shared
+                return self.neg(self.mul(self.make("const", (), -ca, a.kind), b))
             if b.op == "mul" and b.args[0].constant is not None:
                 return self.mul(self.make("const", (), ca * b.args[0].constant, a.kind), b.args[1])
             if b.op == "neg":
-                return self.mul(self.make("const", (), -ca, a.kind), b.args[0])
+                return self.neg(self.mul(a, b.args[0]))
             return self.make("mul", (a, b), kind=a.kind)
         if a.op == "neg" or b.op == "neg":  # one sign outside: the sum around it takes it
             inner = self.mul(a.args[0] if a.op == "neg" else a, b.args[0] if b.op == "neg" else b)
@@ -203,7 +220,9 @@ class Pool:
         return self.make("wrap", (a,), period)
 
     def table(self, a: Node, table: Table, slope: bool = False) -> Node:
-        return self.make("slope" if slope else "table", (a,), table)
+        """A piecewise linear function or its slope; both find the segment once."""
+        segment = self.make("segment", (a,), table, INT)
+        return self.make("slope", (segment,), table) if slope else self.make("table", (segment, a), table)
 
     # truth -----------------------------------------------------------------------------------------
 

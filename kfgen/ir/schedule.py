@@ -93,7 +93,7 @@ class _Scheduler:
             return True
         if node.op in ("field", "element", "read"):
             return False
-        return self.uses[node] > 1 and node.kind != "int"
+        return self.uses[node] > 1 and (node.kind != "int" or node.op == "segment")
 
     # fusing ------------------------------------------------------------------------------------------
 

@@ -108,6 +108,10 @@ class Root(KfFunction):
             return root if root.is_Rational else None
         return None
 
+    def _eval_power(self, exponent: Any) -> Any:
+        """sqrt(a)**2 is a: a variance from a standard deviation of 5*sqrt(dt) is 25*dt."""
+        return self.args[0] ** (exponent / 2) if exponent.is_Integer and exponent % 2 == 0 else None
+
     def _eval_derivative(self, s: Any) -> Any:
         return Rational(1, 2) * SafeReciprocal(self) * self.args[0].diff(s)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ class Floating:
     """An IEEE 754 type."""
 
     helpers = "helpers_float.j2"
-    helper_ops = frozenset({"finite", "wrap", "table", "slope", "min", "max", "sign"})
+    helper_ops = frozenset({"finite", "wrap", "segment", "min", "max", "sign"})
 
     def __init__(self, name: str, dtype: type[np.floating[Any]], suffix: str) -> None:
         self.name = self.c_type = name
@@ -108,32 +107,12 @@ def _wrap(s: Floating, period: Fraction, a: Any) -> Any:
     return a
 
 
-def _table(s: Floating, table: Any, a: Any) -> Any:
-    xs = [s.convert(v) for v in table.x]
-    ys = [s.convert(v) for v in table.y]
-    i = 0
-    while i + 2 < len(xs) and a >= xs[i + 1]:
-        i += 1
-    r = ys[i] + (a - xs[i]) * s.convert(slopes(table)[i])
-    if a <= xs[0]:
-        r = ys[0]
-    if a >= xs[-1]:
-        r = ys[-1]
-    return r
+def _segment(s: Floating, table: Any, a: Any) -> int:
+    return sum(1 for v in table.x if s.convert(v) <= a)
 
 
-def _slope(s: Floating, table: Any, a: Any) -> Any:
-    xs = [s.convert(v) for v in table.x]
-    i = 0
-    while i + 2 < len(xs) and a >= xs[i + 1]:
-        i += 1
-    return s.convert(slopes(table)[i] if xs[0] <= a < xs[-1] else 0)
-
-
-def slopes(table: Any) -> list[Fraction]:
-    """The slope of each segment of a table."""
-    pairs = list(zip(table.x, table.y, strict=True))
-    return [(y1 - y0) / (x1 - x0) for (x0, y0), (x1, y1) in pairwise(pairs)]
+def _table(s: Floating, table: Any, i: int, a: Any) -> Any:
+    return s.convert(table.values()[i]) + s.convert(table.slopes()[i]) * (a - s.convert(table.starts()[i]))
 
 
 _OPERATIONS: dict[str, Callable[..., Any]] = {
@@ -150,7 +129,8 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "sign": lambda s, d, a: s.dtype((a > 0) * 1 - (a < 0) * 1),
     "wrap": _wrap,
     "table": _table,
-    "slope": _slope,
+    "segment": _segment,
+    "slope": lambda s, table, i: s.convert(table.slopes()[i]),
     "finite": lambda s, d, a: bool(a - a >= 0),
     "lt": lambda s, d, a, b: bool(a < b),
     "le": lambda s, d, a, b: bool(a <= b),
