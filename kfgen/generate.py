@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from fractions import Fraction
 
 from kfgen.emit.render import render
 from kfgen.emit.view import View, make_view
-from kfgen.errors import KfgenError
 from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
 from kfgen.ir.count import operations
@@ -40,7 +38,8 @@ def build(spec: Spec, scalar: str | None = None) -> Generated:
     overridden = scalar is not None and scalar != spec.scalar
     if scalar is not None:
         spec = replace(spec, scalar=scalar)
-    code = build_filter(spec, _epsilon(spec.scalar), RESERVED)
+    # a scalar that is not built yet is refused by name, with all else that is not
+    code = build_filter(spec, SCALARS.get(spec.scalar, SCALARS["float"]), RESERVED)
     view = make_view(code, SCALARS[spec.scalar], overridden)
     rows = []
     for function in code.functions:
@@ -56,11 +55,3 @@ def build(spec: Spec, scalar: str | None = None) -> Generated:
 def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:
     """File name -> text of a spec's C. Raises SpecError."""
     return build(spec, scalar).files
-
-
-def _epsilon(scalar: str) -> Fraction:
-    if scalar in SCALARS:
-        return SCALARS[scalar].epsilon
-    if scalar.startswith("q"):
-        return SCALARS["float"].epsilon  # refused later, by name
-    raise KfgenError(f"unknown scalar `{scalar}`; use float or double")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from fractions import Fraction
 from typing import Any
 
 import sympy
@@ -23,11 +22,12 @@ from kfgen.ir.nodes import Table
 from kfgen.ir.program import roots, walk
 from kfgen.ir.trace import Trace
 from kfgen.model import Model, build_model
+from kfgen.scalars import Scalar
 from kfgen.spec.types import Spec
 
 
-def build_filter(spec: Spec, epsilon: Fraction, taken: frozenset[str]) -> FilterCode:
-    """The filter of a spec. epsilon: the scalar's; taken: names that locals must not have.
+def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
+    """The filter of a spec. taken: names that locals must not have.
 
     Raises SpecError for what is not built yet and for what only the model can tell.
     """
@@ -40,9 +40,9 @@ def build_filter(spec: Spec, epsilon: Fraction, taken: frozenset[str]) -> Filter
     update = spec.filter.update
     assert update is not None
     best = _order(model)
-    layout: Layout = UD(n, update) if spec.filter.covariance == "ud" else Full(n, update, epsilon, best)
+    layout: Layout = UD(n, update) if spec.filter.covariance == "ud" else Full(n, update, scalar.epsilon, best)
     order = best if layout.reorders else list(range(n))
-    code = Ekf(model, layout, order, epsilon).code(taken)
+    code = Ekf(model, layout, order, scalar).code(taken)
     return _with_tables(code)
 
 

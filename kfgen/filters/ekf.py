@@ -25,6 +25,7 @@ from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
 from kfgen.quantiles import chi2_quantile, log_two_pi
+from kfgen.scalars import Scalar
 
 # Measured with gcc 12 on a Cortex-M4F: its schedulers lengthen live ranges, and what no longer fits the registers
 # costs two instructions each time.
@@ -39,13 +40,13 @@ _TITLES = {"kf": "Kalman filter", "ekf": "Extended Kalman filter"}
 class Ekf:
     """Emits a kf or an ekf over any layout."""
 
-    def __init__(self, model: Model, layout: Layout, order: list[int], epsilon: Fraction) -> None:
+    def __init__(self, model: Model, layout: Layout, order: list[int], scalar: Scalar) -> None:
         self.model = model
         self.layout = layout
         self.order = order
-        self.epsilon = epsilon
+        self.scalar = scalar
         self.names = [model.states[i] for i in order]
-        self.state = StateCode(model, layout, order, epsilon)
+        self.state = StateCode(model, layout, order, scalar.epsilon)
 
     def code(self, taken: frozenset[str]) -> FilterCode:
         """The complete filter. taken: names that locals must not have."""
@@ -73,7 +74,7 @@ class Ekf:
 
     def predict(self, taken: frozenset[str]) -> Function:
         """x <- f(x, u, 0), P <- F P F^T + Q + G Qw G^T."""
-        model, t = self.model, Trace()
+        model, t = self.model, Trace(self.scalar.smallest)
         arguments: list[Argument] = [KF]
         if model.inputs:
             arguments.append(INPUTS)
@@ -94,11 +95,12 @@ class Ekf:
                 t.name(value, f"f_{row_name}_{name}")
         P = self.layout.predict(t, self.layout.load(t), F, Q, noise)
         x = [t.name(value, f"{name}_next") for value, name in zip(result.x, model.states, strict=True)]
+        evidence = self._unconfined(x) + self.layout.evidence(P, after_predict=True)
         P = self._limited(t, P)
         x = self.state.confined(t, x)
         moved = {i for i, (value, before) in enumerate(zip(x, prior.x, strict=True)) if value.node is not before.node}
         t.section("guards")
-        self._guard_finite(t, [x[i] for i in sorted(moved)] + self.layout.evidence(P, after_predict=True))
+        self._guard_finite(t, [x[i] for i in sorted(moved)] + evidence)
         self._store(t, x, moved, P, after_predict=True)
         process.store_time(t, model, step)
         length = "a step of dt" if model.dt is None else f"one step of {float(model.dt):.6g} s"
@@ -112,7 +114,7 @@ class Ekf:
 
     def update(self, sensor: SensorModel, taken: frozenset[str]) -> Function:
         """The update with the whole vector z of a sensor."""
-        model, t = self.model, Trace()
+        model, t = self.model, Trace(self.scalar.smallest)
         arguments: list[Argument] = [KF, sensor_argument(sensor.name)]
         if needs_inputs(model, sensor):
             arguments.append(INPUTS)
@@ -125,20 +127,21 @@ class Ekf:
                 t.guard(r < 0, "NOT_POSITIVE", "a measurement variance is negative")
                 assume_nonnegative(r)
         result = self._sequence(t, sensor, innovation)
+        evidence = self._unconfined(result.x) + self.layout.evidence(result.P, after_predict=False)
         P = self._limited(t, result.P)
         x = self.state.confined(t, result.x)
         t.section("guards")
         if sensor.gate is None:
             # nis shows whether z is finite, but for components that may have been skipped
             skippable = [v for v, r in zip(innovation.y, innovation.variances, strict=True) if not is_positive(r)]
-            self._guard_finite(t, [*skippable, result.nis, *x, *self.layout.evidence(P, after_predict=False)])
+            self._guard_finite(t, [*skippable, result.nis, *x, *evidence])
             self._guard_positive(t, result.failures)
         else:
             # A far outlier may overflow nis and is gated all the same: z is tested by itself, and first.
             self._guard_finite(t, [*innovation.y, *result.s])
             self._guard_positive(t, result.failures)
             self._gate(t, sensor, result.nis)
-            self._guard_finite(t, [result.nis, *x, *self.layout.evidence(P, after_predict=False)])
+            self._guard_finite(t, [result.nis, *x, *evidence])
         self._store(t, x, set(range(len(x))), P, after_predict=False)
         if counts_gated(model, sensor):
             t.store(f"kf.gate_count_{sensor.name}", None, t.wrapped(t.pool.integer(0)))
@@ -217,6 +220,10 @@ class Ekf:
             return P
         t.section("limits of the variances")
         return self.layout.limit(t, P, floors, ceilings)
+
+    def _unconfined(self, x: list[Value]) -> list[Value]:
+        """States before their bounds, which would hide what is infinite."""
+        return [v for v, bounds in zip(x, self.model.bounds, strict=True) if bounds is not None]
 
     def _guard_inputs(self, t: Trace) -> None:
         self._guard_finite(t, [t.field(f"u.{name}") for name in self.model.inputs])

@@ -16,6 +16,7 @@ from kfgen.filters.numbers import (
     is_one,
     is_positive,
     is_zero,
+    reciprocal,
     select,
 )  # fmt: skip
 
@@ -26,6 +27,11 @@ Rows = list[list[Number]]
 def plus(a: Number, b: Number) -> Number:
     """a + b, also where one of them is a structural zero of Python's."""
     return b if is_zero(a) else a if is_zero(b) else a + b
+
+
+def minus(a: Number, b: Number) -> Number:
+    """a - b, likewise."""
+    return a if is_zero(b) else -b if is_zero(a) else a - b
 
 
 def times(a: Number, b: Number) -> Number:
@@ -91,11 +97,11 @@ def _pivot(D: Number, s: Number, d: Number) -> tuple[Number, Number, Number, Num
             return s, 1 / s, 0, a
         r = 1 / a
         return s, v * r, D * r, a
-    # A zero pivot leaves the column to the pivots above. Two quotients, since 1/a may overflow where
-    # neither of them does.
-    assume_nonnegative(a)
-    some = a > 0
-    return s, select(some, v / a, 0), select(some, 0 if fresh else D / a, 1), a
+    # a zero pivot leaves the column to the pivots above
+    some, inverse = reciprocal(assume_nonnegative(a))
+    if fresh:
+        return s, select(some, v / a, 0), select(some, 0, 1), a
+    return s, v * inverse, select(some, D * inverse, 1), a
 
 
 def _element(u: Number, w: Number, s: Number, b: Number, t: Number, own: bool) -> tuple[Number, Number]:
@@ -161,9 +167,8 @@ def _gain(D: Number, f: Number, before: Number) -> tuple[Number, Number, Number]
         assume_positive(s)
         inverse = 1 / s
         return v * inverse, assume_nonnegative(D * (before * inverse)), s
-    assume_nonnegative(s)
-    some = s > 0
-    return select(some, v / s, 0), assume_nonnegative(D * select(some, before / s, 1)), s
+    some, inverse = reciprocal(assume_nonnegative(s))
+    return v * inverse, assume_nonnegative(D * select(some, before * inverse, 1)), s
 
 
 def gram_schmidt(rows: Rows, weights: Vector) -> tuple[Rows, Vector]:
@@ -176,15 +181,14 @@ def gram_schmidt(rows: Rows, weights: Vector) -> tuple[Rows, Vector]:
     U = zeros(n, n)
     D: Vector = [0] * n
     for j in reversed(range(n)):
-        weighted = [x if is_zero(x) else x * d for x, d in zip(W[j], weights, strict=True)]
+        weighted = [times(x, d) for x, d in zip(W[j], weights, strict=True)]
         D[j] = assume_nonnegative(dot(weighted, W[j]))
+        if is_zero(D[j]):
+            continue
+        inverse = 1 / D[j] if is_positive(D[j]) else reciprocal(D[j])[1]
         for i in range(j):
-            product = dot(weighted, W[i])
-            if is_zero(product) or is_zero(D[j]):
-                continue
-            u = product / D[j] if is_positive(D[j]) else select(D[j] > 0, product / D[j], 0)
-            U[i][j] = u
-            W[i] = [a if is_zero(c) else a - u * c for a, c in zip(W[i], W[j], strict=True)]
+            U[i][j] = u = times(dot(weighted, W[i]), inverse)
+            W[i] = [minus(a, times(u, c)) for a, c in zip(W[i], W[j], strict=True)]
     return U, D
 
 
@@ -200,9 +204,9 @@ def udu(P: Rows) -> tuple[Rows, Vector]:
         if is_zero(D[j]) or is_negligible(D[j], scale[j]):
             D[j] = 0
             continue
+        inverse = 1 / D[j] if is_positive(D[j]) else reciprocal(D[j])[1]
         for i in range(j):
-            if not is_zero(P[i][j]):
-                U[i][j] = P[i][j] / D[j] if is_positive(D[j]) else select(D[j] > 0, P[i][j] / D[j], 0)
+            U[i][j] = times(P[i][j], inverse)
         for i in range(j):
             for k in range(i + 1):
                 if not is_zero(U[i][j]) and not is_zero(P[k][j]):
@@ -211,14 +215,9 @@ def udu(P: Rows) -> tuple[Rows, Vector]:
 
 
 def quotients(c: Vector, s: Number, r: Number) -> Vector:
-    """c / s, and 0 where s is 0, for s = r + something not negative.
-
-    Where r is positive a shared reciprocal serves; where it may be zero 1/s can overflow and c/s cannot.
-    """
-    if is_positive(r):
-        inverse = 1 / s
-        return [x if is_zero(x) else x * inverse for x in c]
-    return [x if is_zero(x) else select(s > 0, x / s, 0) for x in c]
+    """c / s, and 0 where s is 0, for s = r + something not negative."""
+    inverse = 1 / s if is_positive(r) else reciprocal(s)[1]
+    return [times(x, inverse) for x in c]
 
 
 class Symmetric:

@@ -32,6 +32,18 @@ def select(condition: Any, a: Number, b: Number) -> Number:
     return a if condition else b
 
 
+def reciprocal(a: Number) -> tuple[Any, Number]:
+    """Whether a, which is not negative, is above zero, and 1/a or 0.
+
+    Above zero is above the smallest number that has a reciprocal: 1/a is then finite, and so is the quotient of
+    anything that a contains.
+    """
+    some = a > (a.trace.smallest if isinstance(a, Value) else 0)
+    if isinstance(a, Value):
+        return some, select(some, 1 / a, 0)
+    return some, 1 / a if some else 0
+
+
 def sqrt(a: Number) -> Number:
     if isinstance(a, Value):
         return a.trace.function("sqrt", a)

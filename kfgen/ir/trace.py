@@ -97,7 +97,8 @@ class Block:
 class Trace:
     """The recording of one function."""
 
-    def __init__(self) -> None:
+    def __init__(self, smallest: Fraction | int = 0) -> None:
+        self.smallest = smallest  # a number not above it counts as zero where it divides
         self.pool = _RecordingPool(self)
         self.block = Block()
         self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body

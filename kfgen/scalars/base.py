@@ -19,6 +19,7 @@ class Scalar(Protocol):
     helpers: str
     helper_ops: frozenset[str]
     epsilon: Fraction  # relative spacing at 1
+    smallest: Fraction  # the smallest number whose reciprocal is a number
 
     def literal(self, value: Fraction) -> str:
         """A constant, rounded once, as C reads it back to the same value."""

@@ -25,6 +25,7 @@ class Floating:
         info = np.finfo(dtype)
         self.size = info.bits // 8
         self.epsilon = Fraction(float(info.eps))
+        self.smallest = Fraction(2) ** int(info.minexp)
         self._mantissa = info.nmant + 1
         self._smallest = int(info.minexp) - info.nmant
 
