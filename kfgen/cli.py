@@ -20,6 +20,9 @@ from kfgen.commands.run import run
 from kfgen.commands.simulate import simulate
 from kfgen.errors import KfgenError
 
+# matrices here are small: a pool of threads only makes them wait for each other
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 
 

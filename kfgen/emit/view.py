@@ -342,10 +342,13 @@ def _signature(head: str, arguments: list[str]) -> list[str]:
     line = head + ", ".join(arguments) + ")"
     if len(line) <= WIDTH - 1:
         return [line]
+    ended = [a + "," for a in arguments[:-1]] + [arguments[-1] + ")"]
     pad = " " * len(head)
-    out = [head + arguments[0] + ","]
-    out += [pad + a + "," for a in arguments[1:-1]]
-    return [*out, pad + arguments[-1] + ")"]
+    lines = [head + ended[0], *(pad + a for a in ended[1:])]
+    if max(map(len, lines)) < WIDTH:
+        return lines
+    kind, name = head.rsplit(" ", 1)
+    return [*([head] if len(head) < WIDTH else [kind, name]), *("    " + a for a in ended)]
 
 
 def _safe(text: str) -> str:

@@ -76,32 +76,36 @@ def rank_one(U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]]) -> N
         steps = []
         for c, w in enumerate(W):
             if not is_zero(weights[c]) and not is_zero(w[j]):
-                s, b, t, D[j] = _pivot(D[j], w[j], weights[c])
-                weights[c] = 0 if is_zero(t) else weights[c] if is_one(t) else weights[c] * t
+                s, b, t, D[j], weights[c] = _pivot(D[j], w[j], weights[c])
                 steps.append((w, s, b, t, columns[c][2] == j))
         for i in range(j):
             for w, s, b, t, own in steps:
                 U[i][j], w[i] = _element(U[i][j], w[i], s, b, t, own)
 
 
-def _pivot(D: Number, s: Number, d: Number) -> tuple[Number, Number, Number, Number]:
-    """s, b, t and the new D of a pivot: b = d s / D', t = D / D', D' = D + d s^2."""
-    v = d if is_one(s) else d * s
+def _pivot(D: Number, s: Number, d: Number) -> tuple[Number, Number, Number, Number, Number]:
+    """s, b, t, the new D of a pivot, and the weight that is left for the pivots above.
+
+    D' = D + d s^2, b = d s / D', t = D / D', d' = d t.
+    """
+    v = times(d, s)
     fresh = is_zero(D)
     a = v * s if fresh else D + s * v
     if fresh and is_one(s):
-        return s, 1, 0, a  # whatever d is: a direction without variance takes any U
+        return s, 1, 0, a, 0  # whatever d is: a direction without variance takes any U
+    if fresh and is_positive(a):
+        return s, 1 / s, 0, assume_positive(a), 0
     if is_positive(D) or is_positive(a):
-        assume_positive(a)
-        if fresh:
-            return s, 1 / s, 0, a
-        r = 1 / a
-        return s, v * r, D * r, a
-    # a zero pivot leaves the column to the pivots above
-    some, inverse = reciprocal(assume_nonnegative(a))
+        r = 1 / assume_positive(a)
+        b, t = v * r, D * r
+        return s, b, t, a, d * t
+    # A zero pivot leaves the column to the pivots above. Quotients, since 1/a may overflow where they do not.
+    some = assume_nonnegative(a) > 0
+    b = select(some, v / a, 0)
     if fresh:
-        return s, select(some, v / a, 0), select(some, 0, 1), a
-    return s, v * inverse, select(some, D * inverse, 1), a
+        return s, b, 1, a, select(some, 0, d)
+    t = select(some, D / a, 1)
+    return s, b, t, a, d * t
 
 
 def _element(u: Number, w: Number, s: Number, b: Number, t: Number, own: bool) -> tuple[Number, Number]:

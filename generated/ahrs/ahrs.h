@@ -1,0 +1,178 @@
+/* kfgen build ahrs.yaml
+ *
+ * ahrs: attitude and gyro bias from gyro, accelerometer and magnetometer
+ *
+ * Extended Kalman filter, U D U^T covariance, bierman update, float
+ *
+ * state x (7)
+ *   q0           scalar part
+ *   q1
+ *   q2
+ *   q3
+ *   bx  [rad/s]  gyro bias
+ *   by  [rad/s]
+ *   bz  [rad/s]
+ * step: given at each step, clamped to at least 0.001 s, at most 0.1 s
+ *
+ * RAM 164 bytes a filter. Operations:
+ *   predict       474 mul, 324 add, 48 div, 23 compare, 44 select
+ *   update_accel  336 mul, 243 add, 24 div, 5 compare
+ *   update_mag    351 mul, 255 add, 24 div, 5 compare
+ *
+ * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
+ * 219a179cd2c35a94a5ef8f0d3c46f5dd92dfcd65d45d99ef51e29983c78dfdb5
+ * This file and ahrs.c are yours: use, change and ship them without condition.
+ */
+#ifndef AHRS_H_INCLUDED
+#define AHRS_H_INCLUDED
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define AHRS_NX 7
+#define AHRS_NU 3
+#define AHRS_NZ_ACCEL 3
+#define AHRS_NZ_MAG 3
+
+/* indices into x */
+enum {
+    AHRS_Q0, /* scalar part */
+    AHRS_Q1,
+    AHRS_Q2,
+    AHRS_Q3,
+    AHRS_BX, /* [rad/s] gyro bias */
+    AHRS_BY, /* [rad/s] */
+    AHRS_BZ  /* [rad/s] */
+};
+
+typedef float ahrs_real_t;
+
+/* 0, or a sum of flags; from AHRS_ERROR up the call has failed and has changed nothing */
+typedef uint32_t ahrs_status_t;
+#define AHRS_OK             0x000u
+#define AHRS_REGULARIZED    0x001u /* a variance was limited, or taken to zero by round-off */
+#define AHRS_GLITCH_SMALL   0x002u /* an innovation was weighted down */
+#define AHRS_GLITCH_LARGE   0x004u /* an innovation was cut off */
+#define AHRS_ANOMALY        0x008u /* an innovation beyond its variance was taken all the same */
+#define AHRS_GATED          0x010u /* the measurement was refused; nothing but nis has changed */
+#define AHRS_SATURATED      0x020u /* a number was clipped to its range */
+#define AHRS_DT_CLAMPED     0x040u /* dt was outside of its limits and was clamped */
+#define AHRS_POINT_REJECTED 0x080u /* a sigma point was replaced */
+#define AHRS_ERROR          0x100u /* errors from here up */
+#define AHRS_NULL_ARGUMENT  0x100u /* a pointer is NULL */
+#define AHRS_NOT_FINITE     0x200u /* an argument or a value of the model is NaN or infinite */
+#define AHRS_NOT_POSITIVE   0x400u /* a variance or dt is not positive */
+
+typedef struct {
+    ahrs_real_t gx; /* [rad/s] */
+    ahrs_real_t gy; /* [rad/s] */
+    ahrs_real_t gz; /* [rad/s] */
+} ahrs_inputs_t;
+
+typedef struct {
+    ahrs_real_t x; /* [m/s^2] */
+    ahrs_real_t y; /* [m/s^2] */
+    ahrs_real_t z; /* [m/s^2] */
+} ahrs_accel_t;
+
+typedef struct {
+    ahrs_real_t x; /* [uT] */
+    ahrs_real_t y; /* [uT] */
+    ahrs_real_t z; /* [uT] */
+} ahrs_mag_t;
+
+typedef struct {
+    ahrs_real_t gyro_noise;  /* [rad/s/sqrt(Hz)] more than at rest: scale, alignment */
+    ahrs_real_t field_north; /* [uT] */
+    ahrs_real_t field_up;    /* [uT] */
+} ahrs_parameters_t;
+
+/* The filter. Plain data: copy it, keep as many as you like. */
+typedef struct {
+    ahrs_real_t x[7];             /* state */
+    ahrs_real_t U[21];            /* unit upper triangular factor, strict upper triangle by columns */
+    ahrs_real_t D[7];             /* diagonal factor: P = U D U^T */
+    ahrs_parameters_t parameters; /* may be changed while the filter runs */
+    ahrs_real_t nis;              /* normalised innovation squared of the last update */
+    uint32_t gate_count_accel;    /* measurements of accel refused in a row */
+    uint32_t gate_count_mag;      /* measurements of mag refused in a row */
+} ahrs_t;
+
+/**
+ * Set the state, its covariance and the parameters to their initial values.
+ *
+ * @param kf  filter
+ * @return AHRS_OK, or AHRS_NULL_ARGUMENT
+ */
+ahrs_status_t ahrs_init(ahrs_t *kf);
+
+/**
+ * Advance the estimate by a step of dt.
+ *
+ * @param kf  filter
+ * @param u   gx [rad/s], gy [rad/s], gz [rad/s]
+ * @param dt  time step [s]
+ * @return AHRS_OK, AHRS_DT_CLAMPED, or an error that leaves *kf as it was
+ *
+ * 474 mul, 324 add, 48 div, 23 compare, 44 select.
+ */
+ahrs_status_t ahrs_predict(ahrs_t *kf, const ahrs_inputs_t *u, ahrs_real_t dt);
+
+/**
+ * Take a measurement of accel into account.
+ *
+ * @param kf  filter
+ * @param z   x [m/s^2], y [m/s^2], z [m/s^2]
+ * @return AHRS_OK, AHRS_ANOMALY, AHRS_GATED, or an error that leaves *kf as it was
+ *
+ * 336 mul, 243 add, 24 div, 5 compare.
+ */
+ahrs_status_t ahrs_update_accel(ahrs_t *kf, const ahrs_accel_t *z);
+
+/**
+ * Take a measurement of mag into account.
+ *
+ * @param kf  filter
+ * @param z   x [uT], y [uT], z [uT]
+ * @return AHRS_OK, AHRS_ANOMALY, AHRS_GATED, or an error that leaves *kf as it was
+ *
+ * 351 mul, 255 add, 24 div, 5 compare.
+ */
+ahrs_status_t ahrs_update_mag(ahrs_t *kf, const ahrs_mag_t *z);
+
+/**
+ * Replace the state; angles are wrapped, the covariance stays.
+ *
+ * @param kf  filter
+ * @param x   new state
+ * @return AHRS_OK, or an error that leaves *kf as it was
+ */
+ahrs_status_t ahrs_set_state(ahrs_t *kf, const ahrs_real_t x[7]);
+
+/**
+ * Replace the covariance; the state stays.
+ *
+ * @param kf  filter
+ * @param P   covariance, row-major; the upper triangle is read
+ * @return AHRS_OK, or an error that leaves *kf as it was
+ */
+ahrs_status_t ahrs_set_covariance(ahrs_t *kf, const ahrs_real_t P[49]);
+
+/**
+ * The covariance of the state, in the order of the states.
+ *
+ * @param kf  filter
+ * @param P   covariance, row-major
+ */
+void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[49]);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,309 @@
+/* kfgen build cv2d.yaml */
+#include "cv2d.h"
+
+#if defined(__FAST_MATH__)
+#error "cv2d tests for NaN and infinity, which -ffast-math removes"
+#endif
+
+/* inner position -> index into x */
+static const uint8_t cv2d_order[4] = { 0, 2, 1, 3 };
+
+/* false for NaN and for infinity: their difference from themselves is NaN */
+static bool cv2d_finite(float a)
+{
+    return a - a >= 0.0f;
+}
+
+cv2d_status_t cv2d_init(cv2d_t *kf)
+{
+    if (kf == NULL) { return CV2D_NULL_ARGUMENT; }
+    for (int i = 0; i < 4; i++) {
+        kf->x[i] = 0.0f;
+    }
+    for (int i = 0; i < 6; i++) {
+        kf->U[i] = 0.0f;
+    }
+    kf->D[0] = 100.0f;
+    kf->D[1] = 9.0f;
+    kf->D[2] = 100.0f;
+    kf->D[3] = 9.0f;
+    kf->nis = 0.0f;
+    kf->parameters.agility = 0.3f;
+    return CV2D_OK;
+}
+
+cv2d_status_t cv2d_predict(cv2d_t *kf, cv2d_real_t dt)
+{
+    if (kf == NULL) { return CV2D_NULL_ARGUMENT; }
+    cv2d_status_t flags = CV2D_OK;
+    if (!cv2d_finite(dt)) { return CV2D_NOT_FINITE; }
+    const bool t0 = dt < 0.001f;
+    if (t0) { flags |= CV2D_DT_CLAMPED; }
+    const bool t1 = dt > 10.0f;
+    if (t1) { flags |= CV2D_DT_CLAMPED; }
+    const float step = t1 ? 10.0f : (t0 ? 0.001f : dt);
+    const float vx = kf->x[CV2D_VX];
+    const float vy = kf->x[CV2D_VY];
+
+    /* model */
+    const float px_next = kf->x[CV2D_PX] + vx * step;
+    const float py_next = kf->x[CV2D_PY] + vy * step;
+    const float t2 = 0.21132487f * step;
+    const float t3 = kf->parameters.agility * kf->parameters.agility * (0.5f * step);
+    const float t4 = 0.7886751f * step;
+
+    /* F U, unit upper triangular as F is */
+    const float t5 = kf->U[0] + step;
+    const float t6 = kf->U[1] + step * kf->U[2];
+    const float t7 = kf->U[3] + step * kf->U[4];
+    const float t8 = kf->U[5] + step;
+
+    /* process noise */
+    const float t9 = kf->D[3] + t3;
+    const bool t10 = t9 > 0.0f;
+    const float t11 = t10 ? t3 / t9 : 0.0f;
+    const float t12 = t3 * (t10 ? kf->D[3] / t9 : 1.0f);
+    const float d_vy = t9 + t3;
+    const bool t13 = d_vy > 0.0f;
+    const float t14 = t13 ? t3 / d_vy : 0.0f;
+    const float t15 = t3 * (t13 ? t9 / d_vy : 1.0f);
+    const float t16 = t7 - t11 * t7;
+    const float u_px_vy = t16 - t14 * t16;
+    const float t17 = kf->U[4] - t11 * kf->U[4];
+    const float u_vx_vy = t17 - t14 * t17;
+    const float t18 = t2 - t8;
+    const float t19 = t8 + t11 * t18;
+    const float t20 = t4 - t19;
+    const float u_py_vy = t19 + t14 * t20;
+    const float t21 = t12 * t18;
+    const float t22 = kf->D[2] + t18 * t21;
+    const bool t23 = t22 > 0.0f;
+    const float t24 = t23 ? t21 / t22 : 0.0f;
+    const float t25 = t12 * (t23 ? kf->D[2] / t22 : 1.0f);
+    const float t26 = t15 * t20;
+    const float d_py = t22 + t20 * t26;
+    const bool t27 = d_py > 0.0f;
+    const float t28 = t27 ? t26 / d_py : 0.0f;
+    const float t29 = t15 * (t27 ? t22 / d_py : 1.0f);
+    const float t30 = t7 + t18 * t6;
+    const float t31 = t6 - t24 * t30;
+    const float t32 = t16 + t20 * t31;
+    const float u_px_py = t31 - t28 * t32;
+    const float t33 = kf->U[4] + t18 * kf->U[2];
+    const float t34 = kf->U[2] - t24 * t33;
+    const float t35 = t17 + t20 * t34;
+    const float u_vx_py = t34 - t28 * t35;
+    const float t36 = kf->D[1] + t3;
+    const bool t37 = t36 > 0.0f;
+    const float t38 = t25 * t33;
+    const float t39 = t36 + t33 * t38;
+    const bool t40 = t39 > 0.0f;
+    const float t41 = t39 + t3;
+    const bool t42 = t41 > 0.0f;
+    const float t43 = t29 * t35;
+    const float d_vx = t41 + t35 * t43;
+    const bool t44 = d_vx > 0.0f;
+    const float t45 = t2 - t5;
+    const float t46 = t5 + (t37 ? t3 / t36 : 0.0f) * t45;
+    const float t47 = t33 * t46 - t30;
+    const float t48 = t46 + (t40 ? -(t38 / t39) : 0.0f) * t47;
+    const float t49 = t4 - t48;
+    const float t50 = t48 + (t42 ? t3 / t41 : 0.0f) * t49;
+    const float t51 = t35 * t50 - t32;
+    const float u_px_vx = t50 + (t44 ? -(t43 / d_vx) : 0.0f) * t51;
+    const float d_px = kf->D[0] + t45 * (t3 * (t37 ? kf->D[1] / t36 : 1.0f) * t45)
+        + t47 * (t25 * (t40 ? t36 / t39 : 1.0f) * t47) + t49 * (t3 * (t42 ? t39 / t41 : 1.0f) * t49)
+        + t51 * (t29 * (t44 ? t41 / d_vx : 1.0f) * t51);
+
+    /* guards */
+    if (!cv2d_finite(px_next + py_next + d_px + d_vx + d_py + d_vy)) { return CV2D_NOT_FINITE; }
+
+    /* store */
+    kf->x[CV2D_PX] = px_next;
+    kf->x[CV2D_PY] = py_next;
+    kf->U[0] = u_px_vx;
+    kf->U[1] = u_px_py;
+    kf->U[2] = u_vx_py;
+    kf->U[3] = u_px_vy;
+    kf->U[4] = u_vx_vy;
+    kf->U[5] = u_py_vy;
+    kf->D[0] = d_px;
+    kf->D[1] = d_vx;
+    kf->D[2] = d_py;
+    kf->D[3] = d_vy;
+    return flags;
+}
+
+cv2d_status_t cv2d_update_camera(cv2d_t *kf, const cv2d_camera_t *z)
+{
+    if (kf == NULL || z == NULL) { return CV2D_NULL_ARGUMENT; }
+
+    /* innovation */
+    const float px = kf->x[CV2D_PX];
+    const float py = kf->x[CV2D_PY];
+    const float y_x = z->x - px;
+    const float y_y = z->y - py;
+
+    /* gain and covariance: x, y */
+    const float t0 = 0.25f + kf->D[0];
+    const float t1 = 1.0f / t0;
+    const float t2 = kf->D[0] * t1;
+    const float d_px = kf->D[0] * (0.25f * t1);
+    const float t3 = kf->D[1] * kf->U[0];
+    const float t4 = t0 + kf->U[0] * t3;
+    const float t5 = 1.0f / t4;
+    const float t6 = t3 * t5;
+    const float d_vx = kf->D[1] * (t0 * t5);
+    const float u_px_vx = kf->U[0] - kf->U[0] * t2;
+    const float t7 = t2 + t6 * u_px_vx;
+    const float t8 = kf->D[2] * kf->U[1];
+    const float t9 = t4 + kf->U[1] * t8;
+    const float t10 = 1.0f / t9;
+    const float t11 = t8 * t10;
+    const float t12 = kf->D[2] * (t4 * t10);
+    const float t13 = 0.25f + t12;
+    const float t14 = 1.0f / t13;
+    const float t15 = t12 * t14;
+    const float d_py = t12 * (0.25f * t14);
+    const float u_vx_py = kf->U[2] - kf->U[1] * t6;
+    const float t16 = t6 + t11 * u_vx_py;
+    const float t17 = t15 * u_vx_py;
+    const float u_px_py = kf->U[1] - kf->U[1] * t7;
+    const float t18 = t7 + t11 * u_px_py;
+    const float t19 = t15 * u_px_py;
+    const float t20 = kf->D[3] * kf->U[3];
+    const float s_x = t9 + kf->U[3] * t20;
+    const float t21 = 1.0f / s_x;
+    const float t22 = t20 * t21;
+    const float t23 = kf->D[3] * (t9 * t21);
+    const float t24 = kf->U[5] - kf->U[3] * t11;
+    const float t25 = t23 * t24;
+    const float s_y = t13 + t24 * t25;
+    const float t26 = 1.0f / s_y;
+    const float t27 = t25 * t26;
+    const float d_vy = t23 * (t13 * t26);
+    const float u_py_vy = t24 - t24 * t15;
+    const float t28 = kf->U[4] - kf->U[3] * t16;
+    const float u_vx_vy = t28 - t24 * t17;
+    const float t29 = kf->U[3] - kf->U[3] * t18;
+    const float u_px_vy = t29 - t24 * t19;
+    const float t30 = (t11 + t22 * t24) * y_x;
+    const float nu_y = y_y - t30;
+    const float nis = y_x * y_x / s_x + nu_y * nu_y / s_y;
+
+    /* state and innovation squared */
+    const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_vy) * nu_y;
+    const float vx_next = kf->x[CV2D_VX] + (t16 + t22 * t28) * y_x + (t17 + t27 * u_vx_vy) * nu_y;
+    const float py_next = py + t30 + (t15 + t27 * u_py_vy) * nu_y;
+    const float vy_next = kf->x[CV2D_VY] + t22 * y_x + t27 * nu_y;
+
+    /* guards */
+    if (!cv2d_finite(y_x + y_y + s_x + s_y)) { return CV2D_NOT_FINITE; }
+    if (!(s_x > 0.0f) || !(s_y > 0.0f)) { return CV2D_NOT_POSITIVE; }
+
+    /* gate */
+    if (nis > 18.420681f) {
+        kf->nis = nis;
+        return CV2D_GATED;
+    }
+    if (!cv2d_finite(nis + px_next + py_next + vx_next + vy_next)) { return CV2D_NOT_FINITE; }
+
+    /* store */
+    kf->x[CV2D_PX] = px_next;
+    kf->x[CV2D_PY] = py_next;
+    kf->x[CV2D_VX] = vx_next;
+    kf->x[CV2D_VY] = vy_next;
+    kf->U[0] = u_px_vx;
+    kf->U[1] = u_px_py;
+    kf->U[2] = u_vx_py;
+    kf->U[3] = u_px_vy;
+    kf->U[4] = u_vx_vy;
+    kf->U[5] = u_py_vy;
+    kf->D[0] = d_px;
+    kf->D[1] = d_vx;
+    kf->D[2] = d_py;
+    kf->D[3] = d_vy;
+    kf->nis = nis;
+    return CV2D_OK;
+}
+
+cv2d_status_t cv2d_set_state(cv2d_t *kf, const cv2d_real_t x[4])
+{
+    if (kf == NULL || x == NULL) { return CV2D_NULL_ARGUMENT; }
+    if (!cv2d_finite(x[CV2D_PX] + x[CV2D_PY] + x[CV2D_VX] + x[CV2D_VY])) { return CV2D_NOT_FINITE; }
+    kf->x[CV2D_PX] = x[CV2D_PX];
+    kf->x[CV2D_PY] = x[CV2D_PY];
+    kf->x[CV2D_VX] = x[CV2D_VX];
+    kf->x[CV2D_VY] = x[CV2D_VY];
+    return CV2D_OK;
+}
+
+cv2d_status_t cv2d_set_covariance(cv2d_t *kf, const cv2d_real_t P[16])
+{
+    if (kf == NULL || P == NULL) { return CV2D_NULL_ARGUMENT; }
+    float p[10];
+    float w[10];
+
+    /* the upper triangle, column by column */
+    float total = 0.0f;
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < j + 1; i++) {
+            const bool t0 = cv2d_order[j] < cv2d_order[i];
+            const float value = P[4 * (t0 ? cv2d_order[j] : cv2d_order[i])
+                + (t0 ? cv2d_order[i] : cv2d_order[j])];
+            p[j * (j + 1) / 2 + i] = value;
+            w[j * (j + 1) / 2 + i] = value;
+            total = total + value;
+        }
+    }
+    if (!cv2d_finite(total)) { return CV2D_NOT_FINITE; }
+
+    /* factor it: a pivot is zero up to round-off, or positive */
+    for (int j = 4 - 1; j >= 0; j--) {
+        const float round_off = 4.7683716e-7f * p[j * (j + 1) / 2 + j];
+        const float pivot = w[j * (j + 1) / 2 + j];
+        if (pivot < -round_off) { return CV2D_NOT_POSITIVE; }
+        const float d = round_off < pivot ? pivot : 0.0f;
+        w[j * (j + 1) / 2 + j] = d;
+        for (int i = j - 1; i >= 0; i--) {
+            const float rest = w[j * (j + 1) / 2 + i];
+            if (d <= 0.0f && 1.9073486e-6f * p[j * (j + 1) / 2 + j] * p[i * (i + 1) / 2 + i] < rest
+                * rest) {
+                return CV2D_NOT_POSITIVE;
+            }
+            const float u = d > 0.0f ? rest / d : 0.0f;
+            for (int k = 0; k < i + 1; k++) {
+                w[i * (i + 1) / 2 + k] = w[i * (i + 1) / 2 + k] - u * w[j * (j + 1) / 2 + k];
+            }
+            w[j * (j + 1) / 2 + i] = u;
+        }
+    }
+
+    /* store */
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < j; i++) {
+            kf->U[j * (j - 1) / 2 + i] = w[j * (j + 1) / 2 + i];
+        }
+        kf->D[j] = w[j * (j + 1) / 2 + j];
+    }
+    return CV2D_OK;
+}
+
+void cv2d_get_covariance(const cv2d_t *kf, cv2d_real_t P[16])
+{
+    if (kf == NULL || P == NULL) { return; }
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < j + 1; i++) {
+            float sum = kf->D[j];
+            if (i < j) {
+                sum = sum * kf->U[j * (j - 1) / 2 + i];
+            }
+            for (int k = j + 1; k < 4; k++) {
+                sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
+            }
+            const float p_1 = sum;
+            P[4 * cv2d_order[i] + cv2d_order[j]] = p_1;
+            P[4 * cv2d_order[j] + cv2d_order[i]] = p_1;
+        }
+    }
+}

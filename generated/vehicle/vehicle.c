@@ -1,0 +1,531 @@
+/* kfgen build vehicle.yaml */
+#include "vehicle.h"
+
+#include <math.h>
+
+#if defined(__FAST_MATH__)
+#error "vehicle tests for NaN and infinity, which -ffast-math removes"
+#endif
+
+/* inner position -> index into x */
+static const uint8_t vehicle_order[5] = { 0, 1, 2, 4, 3 };
+
+/* false for NaN and for infinity: their difference from themselves is NaN */
+static bool vehicle_finite(float a)
+{
+    return a - a >= 0.0f;
+}
+
+/* a in (-half, half], by whole turns of 2 half */
+static float vehicle_wrap(float a, float half)
+{
+    if (a > half || a <= -half) {
+        a -= (half + half) * ceilf((a - half) / (half + half));
+        if (a > half || a <= -half) { a = half; } /* the last bit of a turn */
+    }
+    return a;
+}
+
+vehicle_status_t vehicle_init(vehicle_t *kf)
+{
+    if (kf == NULL) { return VEHICLE_NULL_ARGUMENT; }
+    for (int i = 0; i < 5; i++) {
+        kf->x[i] = 0.0f;
+    }
+    for (int i = 0; i < 10; i++) {
+        kf->U[i] = 0.0f;
+    }
+    kf->D[0] = 9.0f;
+    kf->D[1] = 9.0f;
+    kf->D[2] = 3.24f;
+    kf->D[3] = 0.0001f;
+    kf->D[4] = 25.0f;
+    kf->nis = 0.0f;
+    kf->gate_count_gnss = 0;
+    kf->gate_count_speed = 0;
+    kf->initialized = false;
+    kf->parameters.gyro_noise = 0.003f;
+    kf->parameters.accel_noise = 0.5f;
+    kf->parameters.accel_offset = 1.75f;
+    kf->parameters.gnss_std = 3.0f;
+    return VEHICLE_OK;
+}
+
+vehicle_status_t vehicle_predict(vehicle_t *kf, const vehicle_inputs_t *u, vehicle_real_t dt)
+{
+    if (kf == NULL || u == NULL) { return VEHICLE_NULL_ARGUMENT; }
+    vehicle_status_t flags = VEHICLE_OK;
+
+    /* arguments */
+    if (!vehicle_finite(u->yaw_rate + u->accel)) { return VEHICLE_NOT_FINITE; }
+    if (!vehicle_finite(dt)) { return VEHICLE_NOT_FINITE; }
+    const bool t0 = dt < 0.001f;
+    if (t0) { flags |= VEHICLE_DT_CLAMPED; }
+    const bool t1 = dt > 0.5f;
+    if (t1) { flags |= VEHICLE_DT_CLAMPED; }
+    const float step = t1 ? 0.5f : (t0 ? 0.001f : dt);
+    const float heading = kf->x[VEHICLE_HEADING];
+    const float speed = kf->x[VEHICLE_SPEED];
+    const float gyro_bias = kf->x[VEHICLE_GYRO_BIAS];
+
+    /* model */
+    const float t2 = u->yaw_rate - gyro_bias;
+    const float t3 = kf->parameters.accel_offset - u->accel;
+    const float t4 = 0.5f * step;
+    const float t5 = heading + t2 * t4;
+    const float t6 = speed + t3 * t4;
+    const float cos_heading = cosf(t5);
+    const float t7 = t6 * cos_heading;
+    const float sin_heading = sinf(t5);
+    const float t8 = t6 * sin_heading;
+    const float t9 = t8 * step;
+    const float f_x_gyro_bias = t8 * t4 * step;
+    const float f_x_speed = cos_heading * step;
+    const float f_y_heading = t7 * step;
+    const float x_next = kf->x[VEHICLE_X] + f_y_heading;
+    const float t10 = t7 * t4 * step;
+    const float f_y_speed = sin_heading * step;
+    const float y_next = kf->x[VEHICLE_Y] + t9;
+    const float heading_next = heading + t2 * step;
+    const float speed_next = speed + t3 * step;
+    const float t11 = kf->parameters.gyro_noise * kf->parameters.gyro_noise * step;
+    const float t12 = kf->parameters.accel_noise * kf->parameters.accel_noise * step;
+    const float t13 = 1.0e-10f * step;
+
+    /* F U, unit upper triangular as F is */
+    const float t14 = kf->U[1] - t9;
+    const float t15 = kf->U[2] + f_y_heading;
+    const float t16 = kf->U[3] - t9 * kf->U[5] + f_x_gyro_bias;
+    const float t17 = kf->U[4] + f_y_heading * kf->U[5] - t10;
+    const float t18 = kf->U[5] - step;
+    const float t19 = kf->U[6] - t9 * kf->U[8] + f_x_gyro_bias * kf->U[9] + f_x_speed;
+    const float t20 = kf->U[7] + f_y_heading * kf->U[8] - t10 * kf->U[9] + f_y_speed;
+    const float t21 = kf->U[8] - step * kf->U[9];
+
+    /* process noise */
+    const float d_speed = kf->D[4] + t12;
+    const bool t22 = d_speed > 0.0f;
+    const float t23 = t22 ? t12 / d_speed : 0.0f;
+    const float t24 = t12 * (t22 ? kf->D[4] / d_speed : 1.0f);
+    const float u_x_speed = t19 - t23 * t19;
+    const float u_y_speed = t20 - t23 * t20;
+    const float u_heading_speed = t21 - t23 * t21;
+    const float u_gyro_bias_speed = kf->U[9] - t23 * kf->U[9];
+    const float t25 = t24 * kf->U[9];
+    const float t26 = kf->D[3] + kf->U[9] * t25;
+    const bool t27 = t26 > 0.0f;
+    const float t28 = t27 ? -(t25 / t26) : 0.0f;
+    const float t29 = t24 * (t27 ? kf->D[3] / t26 : 1.0f);
+    const float d_gyro_bias = t26 + t13;
+    const float t30 = 1.0f / d_gyro_bias;
+    const float t31 = t13 * t30;
+    const float t32 = t13 * (t26 * t30);
+    const float t33 = kf->U[9] * t16 - t19;
+    const float t34 = t16 + t28 * t33;
+    const float u_x_gyro_bias = t34 - t31 * t34;
+    const float t35 = kf->U[9] * t17 - t20;
+    const float t36 = t17 + t28 * t35;
+    const float u_y_gyro_bias = t36 - t31 * t36;
+    const float t37 = kf->U[9] * t18 - t21;
+    const float t38 = t18 + t28 * t37;
+    const float u_heading_gyro_bias = t38 - t31 * t38;
+    const float t39 = kf->D[2] + t11;
+    const bool t40 = t39 > 0.0f;
+    const float t41 = t40 ? t11 / t39 : 0.0f;
+    const float t42 = t11 * (t40 ? kf->D[2] / t39 : 1.0f);
+    const float t43 = t29 * t37;
+    const float t44 = t39 + t37 * t43;
+    const bool t45 = t44 > 0.0f;
+    const float t46 = t45 ? t43 / t44 : 0.0f;
+    const float t47 = t29 * (t45 ? t39 / t44 : 1.0f);
+    const float t48 = t32 * t38;
+    const float d_heading = t44 + t38 * t48;
+    const bool t49 = d_heading > 0.0f;
+    const float t50 = t49 ? -(t48 / d_heading) : 0.0f;
+    const float t51 = t32 * (t49 ? t44 / d_heading : 1.0f);
+    const float t52 = t14 - t41 * t14;
+    const float t53 = t33 - t37 * t52;
+    const float t54 = t52 + t46 * t53;
+    const float t55 = t38 * t54 - t34;
+    const float u_x_heading = t54 + t50 * t55;
+    const float t56 = t15 - t41 * t15;
+    const float t57 = t35 - t37 * t56;
+    const float t58 = t56 + t46 * t57;
+    const float t59 = t38 * t58 - t36;
+    const float u_y_heading = t58 + t50 * t59;
+    const float t60 = t42 * t15;
+    const float t61 = kf->D[1] + t15 * t60;
+    const bool t62 = t61 > 0.0f;
+    const float t63 = t47 * t57;
+    const float t64 = t61 + t57 * t63;
+    const bool t65 = t64 > 0.0f;
+    const float t66 = t51 * t59;
+    const float d_y = t64 + t59 * t66;
+    const bool t67 = d_y > 0.0f;
+    const float t68 = t15 * kf->U[0] - t14;
+    const float t69 = kf->U[0] + (t62 ? -(t60 / t61) : 0.0f) * t68;
+    const float t70 = t53 - t57 * t69;
+    const float t71 = t69 + (t65 ? t63 / t64 : 0.0f) * t70;
+    const float t72 = t55 - t59 * t71;
+    const float u_x_y = t71 + (t67 ? t66 / d_y : 0.0f) * t72;
+    const float d_x = kf->D[0] + t68 * (t42 * (t62 ? kf->D[1] / t61 : 1.0f) * t68)
+        + t70 * (t47 * (t65 ? t61 / t64 : 1.0f) * t70)
+        + t72 * (t51 * (t67 ? t64 / d_y : 1.0f) * t72);
+    const float t73 = vehicle_wrap(heading_next, 3.1415927f);
+
+    /* guards */
+    if (!vehicle_finite(x_next + y_next + t73 + speed_next + d_x + d_y + d_heading + d_gyro_bias
+        + d_speed)) {
+        return VEHICLE_NOT_FINITE;
+    }
+
+    /* store */
+    kf->x[VEHICLE_X] = x_next;
+    kf->x[VEHICLE_Y] = y_next;
+    kf->x[VEHICLE_HEADING] = t73;
+    kf->x[VEHICLE_SPEED] = speed_next;
+    kf->U[0] = u_x_y;
+    kf->U[1] = u_x_heading;
+    kf->U[2] = u_y_heading;
+    kf->U[3] = u_x_gyro_bias;
+    kf->U[4] = u_y_gyro_bias;
+    kf->U[5] = u_heading_gyro_bias;
+    kf->U[6] = u_x_speed;
+    kf->U[7] = u_y_speed;
+    kf->U[8] = u_heading_speed;
+    kf->U[9] = u_gyro_bias_speed;
+    kf->D[0] = d_x;
+    kf->D[1] = d_y;
+    kf->D[2] = d_heading;
+    kf->D[3] = d_gyro_bias;
+    kf->D[4] = d_speed;
+    return flags;
+}
+
+vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z)
+{
+    if (kf == NULL || z == NULL) { return VEHICLE_NULL_ARGUMENT; }
+    vehicle_status_t flags = VEHICLE_OK;
+
+    /* the first measurement sets the state */
+    if (!vehicle_finite(z->x + z->y)) { return VEHICLE_NOT_FINITE; }
+    if (!kf->initialized) {
+        kf->x[VEHICLE_X] = z->x;
+        kf->x[VEHICLE_Y] = z->y;
+        kf->nis = 0.0f;
+        kf->initialized = true;
+        return VEHICLE_OK;
+    }
+
+    /* innovation */
+    const float x = kf->x[VEHICLE_X];
+    const float y = kf->x[VEHICLE_Y];
+    const float y_x = z->x - x;
+    const float y_y = z->y - y;
+    const float t0 = kf->parameters.gnss_std * kf->parameters.gnss_std;
+
+    /* gain and covariance: x, y */
+    const float t1 = t0 + kf->D[0];
+    const bool t2 = t1 > 1.1754944e-38f;
+    const float t3 = t2 ? 1.0f / t1 : 0.0f;
+    const float t4 = kf->D[0] * t3;
+    const float d_x = kf->D[0] * (t2 ? t0 * t3 : 1.0f);
+    const float t5 = kf->D[1] * kf->U[0];
+    const float t6 = t1 + kf->U[0] * t5;
+    const bool t7 = t6 > 1.1754944e-38f;
+    const float t8 = t7 ? 1.0f / t6 : 0.0f;
+    const float t9 = t5 * t8;
+    const float t10 = kf->D[1] * (t7 ? t1 * t8 : 1.0f);
+    const float t11 = t0 + t10;
+    const bool t12 = t11 > 1.1754944e-38f;
+    const float t13 = t12 ? 1.0f / t11 : 0.0f;
+    const float t14 = t10 * t13;
+    const float d_y = t10 * (t12 ? t0 * t13 : 1.0f);
+    const float u_x_y = kf->U[0] - kf->U[0] * t4;
+    const float t15 = t4 + t9 * u_x_y;
+    const float t16 = t14 * u_x_y;
+    const float t17 = kf->D[2] * kf->U[1];
+    const float t18 = t6 + kf->U[1] * t17;
+    const bool t19 = t18 > 1.1754944e-38f;
+    const float t20 = t19 ? 1.0f / t18 : 0.0f;
+    const float t21 = t17 * t20;
+    const float t22 = kf->D[2] * (t19 ? t6 * t20 : 1.0f);
+    const float t23 = kf->U[2] - kf->U[1] * t9;
+    const float t24 = t22 * t23;
+    const float t25 = t11 + t23 * t24;
+    const bool t26 = t25 > 1.1754944e-38f;
+    const float t27 = t26 ? 1.0f / t25 : 0.0f;
+    const float t28 = t24 * t27;
+    const float d_heading = t22 * (t26 ? t11 * t27 : 1.0f);
+    const float t29 = t9 + t21 * t23;
+    const float u_y_heading = t23 - t23 * t14;
+    const float t30 = t14 + t28 * u_y_heading;
+    const float t31 = kf->U[1] - kf->U[1] * t15;
+    const float t32 = t15 + t21 * t31;
+    const float u_x_heading = t31 - t23 * t16;
+    const float t33 = t16 + t28 * u_x_heading;
+    const float t34 = kf->D[3] * kf->U[3];
+    const float t35 = t18 + kf->U[3] * t34;
+    const bool t36 = t35 > 1.1754944e-38f;
+    const float t37 = t36 ? 1.0f / t35 : 0.0f;
+    const float t38 = t34 * t37;
+    const float t39 = kf->D[3] * (t36 ? t18 * t37 : 1.0f);
+    const float t40 = kf->U[4] - kf->U[3] * t29;
+    const float t41 = t39 * t40;
+    const float t42 = t25 + t40 * t41;
+    const bool t43 = t42 > 1.1754944e-38f;
+    const float t44 = t43 ? 1.0f / t42 : 0.0f;
+    const float t45 = t41 * t44;
+    const float d_gyro_bias = t39 * (t43 ? t25 * t44 : 1.0f);
+    const float t46 = kf->U[5] - kf->U[3] * t21;
+    const float t47 = t21 + t38 * t46;
+    const float u_heading_gyro_bias = t46 - t40 * t28;
+    const float t48 = t28 + t45 * u_heading_gyro_bias;
+    const float t49 = t29 + t38 * t40;
+    const float u_y_gyro_bias = t40 - t40 * t30;
+    const float t50 = t30 + t45 * u_y_gyro_bias;
+    const float t51 = kf->U[3] - kf->U[3] * t32;
+    const float t52 = t32 + t38 * t51;
+    const float u_x_gyro_bias = t51 - t40 * t33;
+    const float t53 = t33 + t45 * u_x_gyro_bias;
+    const float t54 = kf->D[4] * kf->U[6];
+    const float s_x = t35 + kf->U[6] * t54;
+    const bool t55 = s_x > 1.1754944e-38f;
+    const float t56 = t55 ? 1.0f / s_x : 0.0f;
+    const float t57 = t54 * t56;
+    const float t58 = kf->D[4] * (t55 ? t35 * t56 : 1.0f);
+    const float t59 = kf->U[7] - kf->U[6] * t49;
+    const float t60 = t58 * t59;
+    const float s_y = t42 + t59 * t60;
+    const bool t61 = s_y > 1.1754944e-38f;
+    const float t62 = t61 ? 1.0f / s_y : 0.0f;
+    const float t63 = t60 * t62;
+    const float d_speed = t58 * (t61 ? t42 * t62 : 1.0f);
+    const float t64 = kf->U[9] - kf->U[6] * t38;
+    const float u_gyro_bias_speed = t64 - t59 * t45;
+    const float t65 = kf->U[8] - kf->U[6] * t47;
+    const float u_heading_speed = t65 - t59 * t48;
+    const float u_y_speed = t59 - t59 * t50;
+    const float t66 = kf->U[6] - kf->U[6] * t52;
+    const float u_x_speed = t66 - t59 * t53;
+    const float t67 = (t49 + t57 * t59) * y_x;
+    const float nu_y = y_y - t67;
+    const float nis = (s_x > 0.0f ? y_x * y_x / s_x : 0.0f)
+        + (s_y > 0.0f ? nu_y * nu_y / s_y : 0.0f);
+
+    /* state and innovation squared */
+    const float x_next = x + (t52 + t57 * t66) * y_x + (t53 + t63 * u_x_speed) * nu_y;
+    const float y_next = y + t67 + (t50 + t63 * u_y_speed) * nu_y;
+    const float heading_next = kf->x[VEHICLE_HEADING] + (t47 + t57 * t65) * y_x
+        + (t48 + t63 * u_heading_speed) * nu_y;
+    const float gyro_bias_next = kf->x[VEHICLE_GYRO_BIAS] + (t38 + t57 * t64) * y_x
+        + (t45 + t63 * u_gyro_bias_speed) * nu_y;
+    const float speed_next = kf->x[VEHICLE_SPEED] + t57 * y_x + t63 * nu_y;
+    const float t68 = vehicle_wrap(heading_next, 3.1415927f);
+
+    /* guards */
+    if (!vehicle_finite(y_x + y_y + s_x + s_y)) { return VEHICLE_NOT_FINITE; }
+    if (s_x < 0.0f || s_y < 0.0f) { return VEHICLE_NOT_POSITIVE; }
+
+    /* gate */
+    const bool t69 = nis > 13.815511f;
+    if (t69 && kf->gate_count_gnss < 10) {
+        kf->nis = nis;
+        kf->gate_count_gnss = kf->gate_count_gnss + 1;
+        return flags | VEHICLE_GATED;
+    }
+    if (t69) { flags |= VEHICLE_ANOMALY; }
+    if (!vehicle_finite(nis + x_next + y_next + t68 + speed_next + gyro_bias_next)) {
+        return VEHICLE_NOT_FINITE;
+    }
+
+    /* store */
+    kf->x[VEHICLE_X] = x_next;
+    kf->x[VEHICLE_Y] = y_next;
+    kf->x[VEHICLE_HEADING] = t68;
+    kf->x[VEHICLE_SPEED] = speed_next;
+    kf->x[VEHICLE_GYRO_BIAS] = gyro_bias_next;
+    kf->U[0] = u_x_y;
+    kf->U[1] = u_x_heading;
+    kf->U[2] = u_y_heading;
+    kf->U[3] = u_x_gyro_bias;
+    kf->U[4] = u_y_gyro_bias;
+    kf->U[5] = u_heading_gyro_bias;
+    kf->U[6] = u_x_speed;
+    kf->U[7] = u_y_speed;
+    kf->U[8] = u_heading_speed;
+    kf->U[9] = u_gyro_bias_speed;
+    kf->D[0] = d_x;
+    kf->D[1] = d_y;
+    kf->D[2] = d_heading;
+    kf->D[3] = d_gyro_bias;
+    kf->D[4] = d_speed;
+    kf->gate_count_gnss = 0;
+    kf->nis = nis;
+    return flags;
+}
+
+vehicle_status_t vehicle_update_speed(vehicle_t *kf, const vehicle_speed_t *z)
+{
+    if (kf == NULL || z == NULL) { return VEHICLE_NULL_ARGUMENT; }
+    vehicle_status_t flags = VEHICLE_OK;
+
+    /* innovation */
+    const float speed = kf->x[VEHICLE_SPEED];
+    const float y_v = z->v - speed;
+    const float u_x_y = kf->U[0];
+    const float u_x_heading = kf->U[1];
+    const float u_x_gyro_bias = kf->U[3];
+    const float u_x_speed = kf->U[6];
+    const float u_y_heading = kf->U[2];
+    const float u_y_gyro_bias = kf->U[4];
+    const float u_y_speed = kf->U[7];
+    const float u_heading_gyro_bias = kf->U[5];
+    const float u_heading_speed = kf->U[8];
+    const float u_gyro_bias_speed = kf->U[9];
+    const float d_x = kf->D[0];
+    const float d_y = kf->D[1];
+    const float d_heading = kf->D[2];
+    const float d_gyro_bias = kf->D[3];
+
+    /* gain and covariance */
+    const float s_v = 0.25f + kf->D[4];
+    const float t0 = 1.0f / s_v;
+    const float t1 = kf->D[4] * t0;
+    const float d_speed = kf->D[4] * (0.25f * t0);
+    const float nis = y_v * y_v / s_v;
+
+    /* state and innovation squared */
+    const float x_next = kf->x[VEHICLE_X] + t1 * u_x_speed * y_v;
+    const float y_next = kf->x[VEHICLE_Y] + t1 * u_y_speed * y_v;
+    const float heading_next = kf->x[VEHICLE_HEADING] + t1 * u_heading_speed * y_v;
+    const float gyro_bias_next = kf->x[VEHICLE_GYRO_BIAS] + t1 * u_gyro_bias_speed * y_v;
+    const float speed_next = speed + t1 * y_v;
+    const float t2 = vehicle_wrap(heading_next, 3.1415927f);
+
+    /* guards */
+    if (!vehicle_finite(y_v + s_v)) { return VEHICLE_NOT_FINITE; }
+    if (!(s_v > 0.0f)) { return VEHICLE_NOT_POSITIVE; }
+
+    /* gate */
+    const bool t3 = nis > 15.136705f;
+    if (t3 && kf->gate_count_speed < 10) {
+        kf->nis = nis;
+        kf->gate_count_speed = kf->gate_count_speed + 1;
+        return flags | VEHICLE_GATED;
+    }
+    if (t3) { flags |= VEHICLE_ANOMALY; }
+    if (!vehicle_finite(nis + x_next + y_next + t2 + speed_next + gyro_bias_next)) {
+        return VEHICLE_NOT_FINITE;
+    }
+
+    /* store */
+    kf->x[VEHICLE_X] = x_next;
+    kf->x[VEHICLE_Y] = y_next;
+    kf->x[VEHICLE_HEADING] = t2;
+    kf->x[VEHICLE_SPEED] = speed_next;
+    kf->x[VEHICLE_GYRO_BIAS] = gyro_bias_next;
+    kf->U[0] = u_x_y;
+    kf->U[1] = u_x_heading;
+    kf->U[2] = u_y_heading;
+    kf->U[3] = u_x_gyro_bias;
+    kf->U[4] = u_y_gyro_bias;
+    kf->U[5] = u_heading_gyro_bias;
+    kf->U[6] = u_x_speed;
+    kf->U[7] = u_y_speed;
+    kf->U[8] = u_heading_speed;
+    kf->U[9] = u_gyro_bias_speed;
+    kf->D[0] = d_x;
+    kf->D[1] = d_y;
+    kf->D[2] = d_heading;
+    kf->D[3] = d_gyro_bias;
+    kf->D[4] = d_speed;
+    kf->gate_count_speed = 0;
+    kf->nis = nis;
+    return flags;
+}
+
+vehicle_status_t vehicle_set_state(vehicle_t *kf, const vehicle_real_t x[5])
+{
+    if (kf == NULL || x == NULL) { return VEHICLE_NULL_ARGUMENT; }
+    if (!vehicle_finite(x[VEHICLE_X] + x[VEHICLE_Y] + x[VEHICLE_HEADING] + x[VEHICLE_SPEED]
+        + x[VEHICLE_GYRO_BIAS])) {
+        return VEHICLE_NOT_FINITE;
+    }
+    kf->x[VEHICLE_X] = x[VEHICLE_X];
+    kf->x[VEHICLE_Y] = x[VEHICLE_Y];
+    kf->x[VEHICLE_HEADING] = vehicle_wrap(x[VEHICLE_HEADING], 3.1415927f);
+    kf->x[VEHICLE_SPEED] = x[VEHICLE_SPEED];
+    kf->x[VEHICLE_GYRO_BIAS] = x[VEHICLE_GYRO_BIAS];
+    return VEHICLE_OK;
+}
+
+vehicle_status_t vehicle_set_covariance(vehicle_t *kf, const vehicle_real_t P[25])
+{
+    if (kf == NULL || P == NULL) { return VEHICLE_NULL_ARGUMENT; }
+    float p[15];
+    float w[15];
+
+    /* the upper triangle, column by column */
+    float total = 0.0f;
+    for (int j = 0; j < 5; j++) {
+        for (int i = 0; i < j + 1; i++) {
+            const bool t0 = vehicle_order[j] < vehicle_order[i];
+            const float value = P[5 * (t0 ? vehicle_order[j] : vehicle_order[i])
+                + (t0 ? vehicle_order[i] : vehicle_order[j])];
+            p[j * (j + 1) / 2 + i] = value;
+            w[j * (j + 1) / 2 + i] = value;
+            total = total + value;
+        }
+    }
+    if (!vehicle_finite(total)) { return VEHICLE_NOT_FINITE; }
+
+    /* factor it: a pivot is zero up to round-off, or positive */
+    for (int j = 5 - 1; j >= 0; j--) {
+        const float round_off = 5.9604645e-7f * p[j * (j + 1) / 2 + j];
+        const float pivot = w[j * (j + 1) / 2 + j];
+        if (pivot < -round_off) { return VEHICLE_NOT_POSITIVE; }
+        const float d = round_off < pivot ? pivot : 0.0f;
+        w[j * (j + 1) / 2 + j] = d;
+        for (int i = j - 1; i >= 0; i--) {
+            const float rest = w[j * (j + 1) / 2 + i];
+            if (d <= 0.0f && 2.3841858e-6f * p[j * (j + 1) / 2 + j] * p[i * (i + 1) / 2 + i] < rest
+                * rest) {
+                return VEHICLE_NOT_POSITIVE;
+            }
+            const float u = d > 0.0f ? rest / d : 0.0f;
+            for (int k = 0; k < i + 1; k++) {
+                w[i * (i + 1) / 2 + k] = w[i * (i + 1) / 2 + k] - u * w[j * (j + 1) / 2 + k];
+            }
+            w[j * (j + 1) / 2 + i] = u;
+        }
+    }
+
+    /* store */
+    for (int j = 0; j < 5; j++) {
+        for (int i = 0; i < j; i++) {
+            kf->U[j * (j - 1) / 2 + i] = w[j * (j + 1) / 2 + i];
+        }
+        kf->D[j] = w[j * (j + 1) / 2 + j];
+    }
+    return VEHICLE_OK;
+}
+
+void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25])
+{
+    if (kf == NULL || P == NULL) { return; }
+    for (int j = 0; j < 5; j++) {
+        for (int i = 0; i < j + 1; i++) {
+            float sum = kf->D[j];
+            if (i < j) {
+                sum = sum * kf->U[j * (j - 1) / 2 + i];
+            }
+            for (int k = j + 1; k < 5; k++) {
+                sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
+            }
+            const float p_1 = sum;
+            P[5 * vehicle_order[i] + vehicle_order[j]] = p_1;
+            P[5 * vehicle_order[j] + vehicle_order[i]] = p_1;
+        }
+    }
+}

@@ -1,0 +1,304 @@
+/* kfgen build vehicle_tutorial.yaml */
+#include "vehicle_tutorial.h"
+
+#include <math.h>
+
+#if defined(__FAST_MATH__)
+#error "vehicle_tutorial tests for NaN and infinity, which -ffast-math removes"
+#endif
+
+/* inner position -> index into x */
+static const uint8_t vehicle_tutorial_order[4] = { 0, 2, 1, 3 };
+
+/* false for NaN and for infinity: their difference from themselves is NaN */
+static bool vehicle_tutorial_finite(float a)
+{
+    return a - a >= 0.0f;
+}
+
+vehicle_tutorial_status_t vehicle_tutorial_init(vehicle_tutorial_t *kf)
+{
+    if (kf == NULL) { return VEHICLE_TUTORIAL_NULL_ARGUMENT; }
+    kf->x[VEHICLE_TUTORIAL_PX] = 0.0f;
+    kf->x[VEHICLE_TUTORIAL_PY] = 0.0f;
+    kf->x[VEHICLE_TUTORIAL_V] = 5.0f;
+    kf->x[VEHICLE_TUTORIAL_TH] = 0.3f;
+    for (int i = 0; i < 6; i++) {
+        kf->U[i] = 0.0f;
+    }
+    kf->D[0] = 1.943236f;
+    kf->D[1] = 49.466713f;
+    kf->D[2] = 1.943236f;
+    kf->D[3] = 3.14f;
+    kf->nis = 0.0f;
+    return VEHICLE_TUTORIAL_OK;
+}
+
+vehicle_tutorial_status_t vehicle_tutorial_predict(vehicle_tutorial_t *kf)
+{
+    if (kf == NULL) { return VEHICLE_TUTORIAL_NULL_ARGUMENT; }
+    const float px = kf->x[VEHICLE_TUTORIAL_PX];
+    const float py = kf->x[VEHICLE_TUTORIAL_PY];
+    const float v = kf->x[VEHICLE_TUTORIAL_V];
+    const float th = kf->x[VEHICLE_TUTORIAL_TH];
+
+    /* model */
+    const float step = 0.33333334f * v;
+    const float cos_th = cosf(th);
+    const float f_py_th = step * cos_th;
+    const float px_next = px + f_py_th;
+    const float f_px_v = 0.33333334f * cos_th;
+    const float sin_th = sinf(th);
+    const float t0 = step * sin_th;
+    const float py_next = py + t0;
+    const float f_py_v = 0.33333334f * sin_th;
+
+    /* F U D U^T F^T + Q */
+    const float t1 = kf->U[0] + f_px_v;
+    const float t2 = kf->U[1] + f_px_v * kf->U[2];
+    const float t3 = f_py_v * kf->U[2] + 1.0f;
+    const float t4 = kf->U[3] + f_px_v * kf->U[4] - t0;
+    const float t5 = f_py_v * kf->U[4] + kf->U[5] + f_py_th;
+    const float d_th = 0.083333336f + kf->D[3];
+    const float t6 = 1.0f / d_th;
+    const float t7 = kf->D[3] * t6;
+    const float t8 = kf->D[3] * (0.083333336f * t6);
+    const float u_px_th = t7 * t4;
+    const float u_v_th = t7 * kf->U[4];
+    const float u_py_th = t7 * t5;
+    const float t9 = kf->D[1] * f_py_v;
+    const float t10 = t9 * f_py_v;
+    const bool t11 = t10 > 0.0f;
+    const float t12 = t11 ? t9 / t10 : 0.0f;
+    const float t13 = t11 ? 0.0f : kf->D[1];
+    const float t14 = kf->D[2] * t3;
+    const float t15 = t10 + t3 * t14;
+    const bool t16 = t15 > 0.0f;
+    const float t17 = t16 ? t14 / t15 : 0.0f;
+    const float t18 = t16 ? t10 / t15 : 1.0f;
+    const float t19 = kf->D[2] * t18;
+    const float t20 = t8 * t5;
+    const float d_py = t15 + t5 * t20;
+    const bool t21 = d_py > 0.0f;
+    const float t22 = t21 ? t20 / d_py : 0.0f;
+    const float t23 = t8 * (t21 ? t15 / d_py : 1.0f);
+    const float t24 = t12 * t1;
+    const float t25 = t18 * t24 + t17 * t2;
+    const float t26 = t4 - t5 * t25;
+    const float u_px_py = t25 + t22 * t26;
+    const float t27 = t18 * t12 + t17 * kf->U[2];
+    const float t28 = kf->U[2] - t3 * t12;
+    const float t29 = kf->U[4] - t5 * t27;
+    const float u_v_py = t27 + t22 * t29;
+    const float t30 = 8.333333f + t13;
+    const float t31 = 1.0f / t30;
+    const float t32 = t19 * t28;
+    const float t33 = t30 + t28 * t32;
+    const float t34 = 1.0f / t33;
+    const float t35 = t23 * t29;
+    const float d_v = t33 + t29 * t35;
+    const float t36 = 1.0f / d_v;
+    const float t37 = t13 * t31 * t1;
+    const float t38 = t2 - t3 * t24 - t28 * t37;
+    const float t39 = t37 + t32 * t34 * t38;
+    const float t40 = t26 - t29 * t39;
+    const float u_px_v = t39 + t35 * t36 * t40;
+    const float d_px = kf->D[0] + t1 * (t13 * (8.333333f * t31) * t1)
+        + t38 * (t19 * (t30 * t34) * t38) + t40 * (t23 * (t33 * t36) * t40);
+
+    /* guards */
+    if (!vehicle_tutorial_finite(px_next + py_next + d_px + d_v + d_py + d_th)) {
+        return VEHICLE_TUTORIAL_NOT_FINITE;
+    }
+
+    /* store */
+    kf->x[VEHICLE_TUTORIAL_PX] = px_next;
+    kf->x[VEHICLE_TUTORIAL_PY] = py_next;
+    kf->U[0] = u_px_v;
+    kf->U[1] = u_px_py;
+    kf->U[2] = u_v_py;
+    kf->U[3] = u_px_th;
+    kf->U[4] = u_v_th;
+    kf->U[5] = u_py_th;
+    kf->D[0] = d_px;
+    kf->D[1] = d_v;
+    kf->D[2] = d_py;
+    kf->D[3] = d_th;
+    return VEHICLE_TUTORIAL_OK;
+}
+
+vehicle_tutorial_status_t vehicle_tutorial_update_position(vehicle_tutorial_t *kf,
+                                                           const vehicle_tutorial_position_t *z)
+{
+    if (kf == NULL || z == NULL) { return VEHICLE_TUTORIAL_NULL_ARGUMENT; }
+
+    /* innovation */
+    const float px = kf->x[VEHICLE_TUTORIAL_PX];
+    const float py = kf->x[VEHICLE_TUTORIAL_PY];
+    const float y_x = z->x - px;
+    const float y_y = z->y - py;
+
+    /* gain and covariance: x, y */
+    const float t0 = 0.6477453f + kf->D[0];
+    const float t1 = 1.0f / t0;
+    const float t2 = kf->D[0] * t1;
+    const float d_px = kf->D[0] * (0.6477453f * t1);
+    const float t3 = kf->D[1] * kf->U[0];
+    const float t4 = t0 + kf->U[0] * t3;
+    const float t5 = 1.0f / t4;
+    const float t6 = t3 * t5;
+    const float d_v = kf->D[1] * (t0 * t5);
+    const float u_px_v = kf->U[0] - kf->U[0] * t2;
+    const float t7 = t2 + t6 * u_px_v;
+    const float t8 = kf->D[2] * kf->U[1];
+    const float t9 = t4 + kf->U[1] * t8;
+    const float t10 = 1.0f / t9;
+    const float t11 = t8 * t10;
+    const float t12 = kf->D[2] * (t4 * t10);
+    const float t13 = 0.6477453f + t12;
+    const float t14 = 1.0f / t13;
+    const float t15 = t12 * t14;
+    const float d_py = t12 * (0.6477453f * t14);
+    const float u_v_py = kf->U[2] - kf->U[1] * t6;
+    const float t16 = t6 + t11 * u_v_py;
+    const float t17 = t15 * u_v_py;
+    const float u_px_py = kf->U[1] - kf->U[1] * t7;
+    const float t18 = t7 + t11 * u_px_py;
+    const float t19 = t15 * u_px_py;
+    const float t20 = kf->D[3] * kf->U[3];
+    const float s_x = t9 + kf->U[3] * t20;
+    const float t21 = 1.0f / s_x;
+    const float t22 = t20 * t21;
+    const float t23 = kf->D[3] * (t9 * t21);
+    const float t24 = kf->U[5] - kf->U[3] * t11;
+    const float t25 = t23 * t24;
+    const float s_y = t13 + t24 * t25;
+    const float t26 = 1.0f / s_y;
+    const float t27 = t25 * t26;
+    const float d_th = t23 * (t13 * t26);
+    const float u_py_th = t24 - t24 * t15;
+    const float t28 = kf->U[4] - kf->U[3] * t16;
+    const float u_v_th = t28 - t24 * t17;
+    const float t29 = kf->U[3] - kf->U[3] * t18;
+    const float u_px_th = t29 - t24 * t19;
+    const float t30 = (t11 + t22 * t24) * y_x;
+    const float nu_y = y_y - t30;
+    const float nis = y_x * y_x / s_x + nu_y * nu_y / s_y;
+
+    /* state and innovation squared */
+    const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_th) * nu_y;
+    const float v_next = kf->x[VEHICLE_TUTORIAL_V] + (t16 + t22 * t28) * y_x
+        + (t17 + t27 * u_v_th) * nu_y;
+    const float py_next = py + t30 + (t15 + t27 * u_py_th) * nu_y;
+    const float th_next = kf->x[VEHICLE_TUTORIAL_TH] + t22 * y_x + t27 * nu_y;
+
+    /* guards */
+    if (!vehicle_tutorial_finite(nis + px_next + py_next + v_next + th_next)) {
+        return VEHICLE_TUTORIAL_NOT_FINITE;
+    }
+    if (!(s_x > 0.0f) || !(s_y > 0.0f)) { return VEHICLE_TUTORIAL_NOT_POSITIVE; }
+
+    /* store */
+    kf->x[VEHICLE_TUTORIAL_PX] = px_next;
+    kf->x[VEHICLE_TUTORIAL_PY] = py_next;
+    kf->x[VEHICLE_TUTORIAL_V] = v_next;
+    kf->x[VEHICLE_TUTORIAL_TH] = th_next;
+    kf->U[0] = u_px_v;
+    kf->U[1] = u_px_py;
+    kf->U[2] = u_v_py;
+    kf->U[3] = u_px_th;
+    kf->U[4] = u_v_th;
+    kf->U[5] = u_py_th;
+    kf->D[0] = d_px;
+    kf->D[1] = d_v;
+    kf->D[2] = d_py;
+    kf->D[3] = d_th;
+    kf->nis = nis;
+    return VEHICLE_TUTORIAL_OK;
+}
+
+vehicle_tutorial_status_t vehicle_tutorial_set_state(vehicle_tutorial_t *kf,
+                                                     const vehicle_tutorial_real_t x[4])
+{
+    if (kf == NULL || x == NULL) { return VEHICLE_TUTORIAL_NULL_ARGUMENT; }
+    if (!vehicle_tutorial_finite(x[VEHICLE_TUTORIAL_PX] + x[VEHICLE_TUTORIAL_PY]
+        + x[VEHICLE_TUTORIAL_V] + x[VEHICLE_TUTORIAL_TH])) {
+        return VEHICLE_TUTORIAL_NOT_FINITE;
+    }
+    kf->x[VEHICLE_TUTORIAL_PX] = x[VEHICLE_TUTORIAL_PX];
+    kf->x[VEHICLE_TUTORIAL_PY] = x[VEHICLE_TUTORIAL_PY];
+    kf->x[VEHICLE_TUTORIAL_V] = x[VEHICLE_TUTORIAL_V];
+    kf->x[VEHICLE_TUTORIAL_TH] = x[VEHICLE_TUTORIAL_TH];
+    return VEHICLE_TUTORIAL_OK;
+}
+
+vehicle_tutorial_status_t vehicle_tutorial_set_covariance(vehicle_tutorial_t *kf,
+                                                          const vehicle_tutorial_real_t P[16])
+{
+    if (kf == NULL || P == NULL) { return VEHICLE_TUTORIAL_NULL_ARGUMENT; }
+    float p[10];
+    float w[10];
+
+    /* the upper triangle, column by column */
+    float total = 0.0f;
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < j + 1; i++) {
+            const bool t0 = vehicle_tutorial_order[j] < vehicle_tutorial_order[i];
+            const float value = P[4 * (t0 ? vehicle_tutorial_order[j] : vehicle_tutorial_order[i])
+                + (t0 ? vehicle_tutorial_order[i] : vehicle_tutorial_order[j])];
+            p[j * (j + 1) / 2 + i] = value;
+            w[j * (j + 1) / 2 + i] = value;
+            total = total + value;
+        }
+    }
+    if (!vehicle_tutorial_finite(total)) { return VEHICLE_TUTORIAL_NOT_FINITE; }
+
+    /* factor it: a pivot is zero up to round-off, or positive */
+    for (int j = 4 - 1; j >= 0; j--) {
+        const float round_off = 4.7683716e-7f * p[j * (j + 1) / 2 + j];
+        const float pivot = w[j * (j + 1) / 2 + j];
+        if (pivot < -round_off) { return VEHICLE_TUTORIAL_NOT_POSITIVE; }
+        const float d = round_off < pivot ? pivot : 0.0f;
+        w[j * (j + 1) / 2 + j] = d;
+        for (int i = j - 1; i >= 0; i--) {
+            const float rest = w[j * (j + 1) / 2 + i];
+            if (d <= 0.0f && 1.9073486e-6f * p[j * (j + 1) / 2 + j] * p[i * (i + 1) / 2 + i] < rest
+                * rest) {
+                return VEHICLE_TUTORIAL_NOT_POSITIVE;
+            }
+            const float u = d > 0.0f ? rest / d : 0.0f;
+            for (int k = 0; k < i + 1; k++) {
+                w[i * (i + 1) / 2 + k] = w[i * (i + 1) / 2 + k] - u * w[j * (j + 1) / 2 + k];
+            }
+            w[j * (j + 1) / 2 + i] = u;
+        }
+    }
+
+    /* store */
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < j; i++) {
+            kf->U[j * (j - 1) / 2 + i] = w[j * (j + 1) / 2 + i];
+        }
+        kf->D[j] = w[j * (j + 1) / 2 + j];
+    }
+    return VEHICLE_TUTORIAL_OK;
+}
+
+void vehicle_tutorial_get_covariance(const vehicle_tutorial_t *kf, vehicle_tutorial_real_t P[16])
+{
+    if (kf == NULL || P == NULL) { return; }
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < j + 1; i++) {
+            float sum = kf->D[j];
+            if (i < j) {
+                sum = sum * kf->U[j * (j - 1) / 2 + i];
+            }
+            for (int k = j + 1; k < 4; k++) {
+                sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
+            }
+            const float p_1 = sum;
+            P[4 * vehicle_tutorial_order[i] + vehicle_tutorial_order[j]] = p_1;
+            P[4 * vehicle_tutorial_order[j] + vehicle_tutorial_order[i]] = p_1;
+        }
+    }
+}

@@ -1,0 +1,46 @@
+"""No filter costs more on a Cortex-M4F than its ceiling."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.benchmarks.budgets import CEILINGS, GENERATION, PROBLEMS, cost
+from tests.benchmarks.generation import cold_build
+from tests.benchmarks.measure import missing, recommended_flags
+
+
+@pytest.fixture(scope="module")
+def _tools() -> None:
+    if missing():
+        message = f"not found: {', '.join(missing())}"
+        pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
+
+
+README = (Path(__file__).parents[2] / "README.md").read_text()
+TOLERANCE = 0.02  # of the README's figures: they are those of one version of the compiler
+
+
+@pytest.mark.usefixtures("_tools")
+@pytest.mark.parametrize(("name", "form"), CEILINGS)
+def test_cost(name, form):
+    found = cost(name, form)
+    assert all(found.instructions.values()), "a function was never called"
+    assert CEILINGS[name, form].exceeded(found) == []
+    (row,) = (line for line in README.splitlines() if line.startswith(f"| {name} |") and f"| {form} |" in line)
+    told = [float(cell) for cell in row.split("|")[4:8]]
+    measured = [found.step, found.flash, found.ram, found.stack]
+    assert measured == pytest.approx(told, rel=TOLERANCE), "update the README: make bench"
+
+
+def test_generation_time():
+    # processor time and twice the ceiling: the machine that runs this may be slow, and busy with other tests
+    assert cold_build(PROBLEMS["chain16"].spec)[1] <= 2 * GENERATION
+
+
+def test_flags_are_read_from_the_header():
+    header = "/* x\n * RAM 4 bytes. Functions in -O2:\n * gcc with the flags\n *   -O2 -fno-schedule-insns\n *\n */"
+    assert recommended_flags(header) == ["-O2", "-fno-schedule-insns"]
+    assert recommended_flags("/* none */") == []
