@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from kfgen.emit.render import render
 from kfgen.emit.view import View, make_view
+from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
 from kfgen.ir.count import operations
@@ -40,7 +41,13 @@ def build(spec: Spec, scalar: str | None = None) -> Generated:
         spec = replace(spec, scalar=scalar)
     # a scalar that is not built yet is refused by name, with all else that is not
     code = build_filter(spec, SCALARS.get(spec.scalar, SCALARS["float"]), RESERVED)
-    view = make_view(code, SCALARS[spec.scalar], overridden)
+    try:
+        view = make_view(code, SCALARS[spec.scalar], overridden)
+    except OverflowError as error:
+        place = spec.places.get("scalar", spec.place)
+        raise SpecError.at(
+            place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
+        ) from None
     rows = []
     for function in code.functions:
         counts = operations(function.body)

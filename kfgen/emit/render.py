@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import textwrap
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
+from kfgen.emit.printer import WIDTH
 from kfgen.emit.view import View
+
+_WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
 
 
 @cache
@@ -43,10 +48,28 @@ def render(view: View) -> dict[str, str]:
 
 
 def _tidy(text: str) -> str:
-    """No blanks at line ends, never two empty lines, one newline at the end."""
+    """No line beyond the width for a comment's sake, no blanks at line ends, never two empty lines."""
     out: list[str] = []
     for line in text.split("\n"):
-        line = line.rstrip()
-        if line or (out and out[-1]):
-            out.append(line)
+        for part in _narrow(line.rstrip()):
+            if part or (out and out[-1]):
+                out.append(part)
     return "\n".join(out).rstrip("\n") + "\n"
+
+
+def _narrow(line: str) -> list[str]:
+    """A line as it is, or, where a comment makes it too long, in several: one that trails code goes above it."""
+    if len(line) <= WIDTH:
+        return [line]
+    if line.startswith(" * "):
+        body = line[3:]
+        indent = " " * (len(body) - len(body.lstrip()))
+        first = textwrap.wrap(body, WIDTH - 3, subsequent_indent=indent + "    ", **_WORDS)
+        return [" * " + part for part in first]
+    code, mark, comment = line.partition(" /* ")
+    if mark and comment.endswith(" */") and code.strip():
+        indent = " " * (len(code) - len(code.lstrip()))
+        words = textwrap.wrap(comment.removesuffix(" */"), WIDTH - len(indent) - 6, **_WORDS)
+        above = [f"{indent}{'/*' if i == 0 else '  '} {part}" for i, part in enumerate(words)]
+        return [*above[:-1], above[-1] + " */", code.rstrip()]
+    return [line]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -353,7 +354,7 @@ def _signature(head: str, arguments: list[str]) -> list[str]:
 
 def _safe(text: str) -> str:
     """Free text of the spec, unable to end a comment or to start a trigraph."""
-    return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
+    return re.sub(r"\?(?=\?)", "? ", text.replace("*/", "* /").replace("/*", "/ *"))
 
 
 def _about(unit: str, doc: str) -> str:

@@ -43,10 +43,18 @@ def wrong_name(name: str) -> tuple[str, str] | None:
     return (f"the name `{name}` {why}", f"choose another one, such as `{name}_` or `{name}0`") if why else None
 
 
+# names whose `<name>_t` <stdint.h>, <stddef.h> or what they include defines
+STANDARD_TYPES = re.compile(
+    r"u?int(_least|_fast)?(8|16|32|64|128)|u?int(ptr|max)|s?size|ptrdiff|wchar|max_align|nullptr|float|double"
+)
+
+
 def check_name(name: str, place: Place, problems: Problems, headers: bool = False) -> None:
     wrong = wrong_name(name)
     if wrong is None and headers and name.lower() in C_HEADERS:
         wrong = f"the name `{name}` is that of a standard header ({name.lower()}.h)", "choose another one"
+    if wrong is None and headers and STANDARD_TYPES.fullmatch(name):
+        wrong = f"the filter's type would be `{name}_t`, which C has already", "choose another name"
     if wrong is not None:
         problems.add(place, *wrong)
 
