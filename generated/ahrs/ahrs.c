@@ -740,7 +740,7 @@ ahrs_status_t ahrs_update_accel(ahrs_t *kf, const ahrs_accel_t *z)
     const float t206 = t202 + (t166 + t186 * t190) * nu_y;
     const float t207 = t203 + (t163 + t186 * t191) * nu_y;
     const float nu_z = y_z - h_y_q1 * t204 + h_x_q3 * t205 + h_y_q3 * t206 - h_x_q1 * t207;
-    const float nis = y_x * y_x / s_x + nu_y * nu_y / s_y + nu_z * nu_z / s_z;
+    const float nis = y_x * (y_x * t176) + nu_y * (nu_y * t185) + nu_z * (nu_z * t194);
 
     /* state and innovation squared */
     const float q0_next = q0 + t204 + (t173 + t195 * u_q0_bz) * nu_z;
@@ -1092,7 +1092,7 @@ ahrs_status_t ahrs_update_mag(ahrs_t *kf, const ahrs_mag_t *z)
     const float t216 = t212 + (t176 + t196 * t200) * nu_y;
     const float t217 = t213 + (t173 + t196 * t201) * nu_y;
     const float nu_z = y_z - h_y_q1 * t214 + h_x_q3 * t215 - h_x_q0 * t216 - h_x_q1 * t217;
-    const float nis = y_x * y_x / s_x + nu_y * nu_y / s_y + nu_z * nu_z / s_z;
+    const float nis = y_x * (y_x * t186) + nu_y * (nu_y * t195) + nu_z * (nu_z * t204);
 
     /* state and innovation squared */
     const float q0_next = q0 + t214 + (t183 + t205 * u_q0_bz) * nu_z;

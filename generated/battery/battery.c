@@ -125,9 +125,6 @@ battery_status_t battery_update_terminal(battery_t *kf,
     const float h_voltage_soc = battery_table0_slope[t0];
     const float y_voltage = z->voltage - h_voltage;
     const float t1 = 0.0004f + 0.01f * h_voltage_soc * h_voltage_soc;
-    if (t1 < 0.0f) { /* a measurement variance is negative */
-        return BATTERY_NOT_POSITIVE;
-    }
 
     /* gain and covariance */
     const float t2 = kf->D[0] * h_voltage_soc;
@@ -149,27 +146,32 @@ battery_status_t battery_update_terminal(battery_t *kf,
     const float t15 = kf->D[2] * t14;
     const float s_voltage = t9 + t14 * t15;
     const bool t16 = s_voltage > 1.1754944e-38f;
-    const float t17 = t16 ? 1.0f / s_voltage : 0.0f;
-    const float t18 = t15 * t17;
-    const float d_v_slow = kf->D[2] * (t16 ? t9 * t17 : 1.0f);
+    const float t17 = 1.0f / s_voltage;
+    const float t18 = t16 ? t17 : 0.0f;
+    const float t19 = t15 * t18;
+    const float d_v_slow = kf->D[2] * (t16 ? t9 * t18 : 1.0f);
     const float u_v_fast_v_slow = kf->U[2] - t14 * t12;
     const float u_soc_v_slow = kf->U[1] - t14 * t13;
-    const float nis = s_voltage > 0.0f ? y_voltage * y_voltage / s_voltage : 0.0f;
+    const float nis = s_voltage > 0.0f ? y_voltage * (y_voltage * t17) : 0.0f;
 
     /* state and innovation squared */
-    const float soc_next = soc + (t13 + t18 * u_soc_v_slow) * y_voltage;
-    const float v_fast_next = v_fast + (t12 + t18 * u_v_fast_v_slow) * y_voltage;
-    const float v_slow_next = v_slow + t18 * y_voltage;
-    const float t19 = soc_next < 0.0f ? 0.0f : (soc_next > 1.0f ? 1.0f : soc_next);
+    const float soc_next = soc + (t13 + t19 * u_soc_v_slow) * y_voltage;
+    const float v_fast_next = v_fast + (t12 + t19 * u_v_fast_v_slow) * y_voltage;
+    const float v_slow_next = v_slow + t19 * y_voltage;
+    const float t20 = soc_next < 0.0f ? 0.0f : (soc_next > 1.0f ? 1.0f : soc_next);
 
     /* guards */
-    if (!battery_finite(y_voltage + nis + t19 + v_fast_next + v_slow_next + soc_next)) {
+    if (!battery_finite(y_voltage + t1 + h_voltage_soc)) { return BATTERY_NOT_FINITE; }
+    if (t1 < 0.0f) { /* a measurement variance is negative */
+        return BATTERY_NOT_POSITIVE;
+    }
+    if (!battery_finite(y_voltage + t20 + v_fast_next + v_slow_next + nis + soc_next)) {
         return BATTERY_NOT_FINITE;
     }
     if (s_voltage < 0.0f) { return BATTERY_NOT_POSITIVE; }
 
     /* store */
-    kf->x[BATTERY_SOC] = t19;
+    kf->x[BATTERY_SOC] = t20;
     kf->x[BATTERY_V_FAST] = v_fast_next;
     kf->x[BATTERY_V_SLOW] = v_slow_next;
     kf->U[0] = u_soc_v_fast;

@@ -189,7 +189,7 @@ cv2d_status_t cv2d_update_camera(cv2d_t *kf, const cv2d_camera_t *z)
     const float u_px_vy = t29 - t24 * t19;
     const float t30 = (t11 + t22 * t24) * y_x;
     const float nu_y = y_y - t30;
-    const float nis = y_x * y_x / s_x + nu_y * nu_y / s_y;
+    const float nis = y_x * (y_x * t21) + nu_y * (nu_y * t26);
 
     /* state and innovation squared */
     const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_vy) * nu_y;

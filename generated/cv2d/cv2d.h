@@ -15,7 +15,7 @@
  *
  * RAM 64 bytes a filter. Operations:
  *   predict        53 mul, 47 add, 16 div, 10 compare, 18 select
- *   update_camera  56 mul, 43 add, 8 div, 3 compare
+ *   update_camera  58 mul, 43 add, 6 div, 3 compare
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * 2f94e7294804a58f4fcc6544d79d262fe2aebaa09fc194beeae5c22c05564553
@@ -45,7 +45,7 @@ enum {
 
 typedef float cv2d_real_t;
 
-/* 0, or a sum of flags; from CV2D_ERROR up the call has failed and has changed nothing */
+/* 0, or a sum of flags; from ..._ERROR up the call has failed and has changed nothing */
 typedef uint32_t cv2d_status_t;
 #define CV2D_OK             0x000u
 #define CV2D_REGULARIZED    0x001u /* a variance was limited, or taken to zero by round-off */
@@ -73,7 +73,8 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     cv2d_real_t x[4];             /* state */
-    cv2d_real_t U[6];             /* unit upper triangular factor, strict upper triangle by columns */
+    /* unit upper triangular factor, strict upper triangle by columns */
+    cv2d_real_t U[6];
     cv2d_real_t D[4];             /* diagonal factor: P = U D U^T */
     cv2d_parameters_t parameters; /* may be changed while the filter runs */
     cv2d_real_t nis;              /* normalised innovation squared of the last update */
@@ -105,7 +106,7 @@ cv2d_status_t cv2d_predict(cv2d_t *kf, cv2d_real_t dt);
  * @param z   x [m], y [m]
  * @return CV2D_OK, CV2D_GATED, or an error that leaves *kf as it was
  *
- * 56 mul, 43 add, 8 div, 3 compare.
+ * 58 mul, 43 add, 6 div, 3 compare.
  */
 cv2d_status_t cv2d_update_camera(cv2d_t *kf, const cv2d_camera_t *z);
 

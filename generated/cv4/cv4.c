@@ -160,7 +160,7 @@ cv4_status_t cv4_update_position(cv4_t *kf, const cv4_position_t *z)
     const float u_px_vy = t29 - t24 * t19;
     const float t30 = (t11 + t22 * t24) * y_x;
     const float nu_y = y_y - t30;
-    const float nis = y_x * y_x / s_x + nu_y * nu_y / s_y;
+    const float nis = y_x * (y_x * t21) + nu_y * (nu_y * t26);
 
     /* state and innovation squared */
     const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_vy) * nu_y;
@@ -169,7 +169,7 @@ cv4_status_t cv4_update_position(cv4_t *kf, const cv4_position_t *z)
     const float vy_next = kf->x[CV4_VY] + t22 * y_x + t27 * nu_y;
 
     /* guards */
-    if (!cv4_finite(nis + px_next + py_next + vx_next + vy_next)) { return CV4_NOT_FINITE; }
+    if (!cv4_finite(px_next + py_next + vx_next + vy_next + nis)) { return CV4_NOT_FINITE; }
     if (!(s_x > 0.0f) || !(s_y > 0.0f)) { return CV4_NOT_POSITIVE; }
 
     /* store */

@@ -310,8 +310,8 @@ gps_status_t gps_update_range(gps_t *kf, const gps_range_t *z, const gps_inputs_
     const double t164 = t160 + (t99 + t142 * t146) * nu_r3;
     const double t165 = t161 + t142 * nu_r3;
     const double nu_r4 = y_r4 - t162 + t28 * t163 + t29 * t164 + t30 * t165;
-    const double nis = y_r1 * y_r1 / s_r1 + nu_r2 * nu_r2 / s_r2 + nu_r3 * nu_r3 / s_r3
-        + nu_r4 * nu_r4 / s_r4;
+    const double nis = y_r1 * (y_r1 * t125) + nu_r2 * (nu_r2 * t133) + nu_r3 * (nu_r3 * t141)
+        + nu_r4 * (nu_r4 * t149);
 
     /* state and innovation squared */
     const double drift_next = kf->x[GPS_DRIFT] + (t117 + t126 * t151) * y_r1
@@ -323,7 +323,7 @@ gps_status_t gps_update_range(gps_t *kf, const gps_range_t *z, const gps_inputs_
     const double z_next = z_1 + t165 + t150 * nu_r4;
 
     /* guards */
-    if (!gps_finite(nis + x_next + y_next + z_next + clock_next + drift_next)) {
+    if (!gps_finite(x_next + y_next + z_next + clock_next + drift_next + nis)) {
         return GPS_NOT_FINITE;
     }
     if (((!(s_r1 > 0.0) || !(s_r2 > 0.0)) || !(s_r3 > 0.0)) || !(s_r4 > 0.0)) {

@@ -47,13 +47,13 @@ scalar_status_t scalar_update_gauge(scalar_t *kf, const scalar_gauge_t *z)
     const float s_height = 0.01f + kf->D[0];
     const float t0 = 1.0f / s_height;
     const float d_level = kf->D[0] * (0.01f * t0);
-    const float nis = y_height * y_height / s_height;
+    const float nis = y_height * (y_height * t0);
 
     /* state and innovation squared */
     const float level_next = level + kf->D[0] * t0 * y_height;
 
     /* guards */
-    if (!scalar_finite(nis + level_next)) { return SCALAR_NOT_FINITE; }
+    if (!scalar_finite(level_next + nis)) { return SCALAR_NOT_FINITE; }
     if (!(s_height > 0.0f)) { return SCALAR_NOT_POSITIVE; }
 
     /* store */

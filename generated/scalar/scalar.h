@@ -10,7 +10,7 @@
  *
  * RAM 12 bytes a filter. Operations:
  *   predict       1 add
- *   update_gauge  5 mul, 4 add, 2 div, 1 compare
+ *   update_gauge  6 mul, 4 add, 1 div, 1 compare
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * 874cff36329667e7da8641f717958ac851b7240fcc7c2b52349f193c6346f64c
@@ -37,7 +37,7 @@ enum {
 
 typedef float scalar_real_t;
 
-/* 0, or a sum of flags; from SCALAR_ERROR up the call has failed and has changed nothing */
+/* 0, or a sum of flags; from ..._ERROR up the call has failed and has changed nothing */
 typedef uint32_t scalar_status_t;
 #define SCALAR_OK             0x000u
 #define SCALAR_REGULARIZED    0x001u /* a variance was limited, or taken to zero by round-off */
@@ -89,7 +89,7 @@ scalar_status_t scalar_predict(scalar_t *kf);
  * @param z   height [m]
  * @return SCALAR_OK, or an error that leaves *kf as it was
  *
- * 5 mul, 4 add, 2 div, 1 compare.
+ * 6 mul, 4 add, 1 div, 1 compare.
  */
 scalar_status_t scalar_update_gauge(scalar_t *kf, const scalar_gauge_t *z);
 

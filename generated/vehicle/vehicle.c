@@ -291,58 +291,60 @@ vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z)
     const float t54 = kf->D[4] * kf->U[6];
     const float s_x = t35 + kf->U[6] * t54;
     const bool t55 = s_x > 1.1754944e-38f;
-    const float t56 = t55 ? 1.0f / s_x : 0.0f;
-    const float t57 = t54 * t56;
-    const float t58 = kf->D[4] * (t55 ? t35 * t56 : 1.0f);
-    const float t59 = kf->U[7] - kf->U[6] * t49;
-    const float t60 = t58 * t59;
-    const float s_y = t42 + t59 * t60;
-    const bool t61 = s_y > 1.1754944e-38f;
-    const float t62 = t61 ? 1.0f / s_y : 0.0f;
-    const float t63 = t60 * t62;
-    const float d_speed = t58 * (t61 ? t42 * t62 : 1.0f);
-    const float t64 = kf->U[9] - kf->U[6] * t38;
-    const float u_gyro_bias_speed = t64 - t59 * t45;
-    const float t65 = kf->U[8] - kf->U[6] * t47;
-    const float u_heading_speed = t65 - t59 * t48;
-    const float u_y_speed = t59 - t59 * t50;
-    const float t66 = kf->U[6] - kf->U[6] * t52;
-    const float u_x_speed = t66 - t59 * t53;
-    const float t67 = (t49 + t57 * t59) * y_x;
-    const float nu_y = y_y - t67;
-    const float nis = (s_x > 0.0f ? y_x * y_x / s_x : 0.0f)
-        + (s_y > 0.0f ? nu_y * nu_y / s_y : 0.0f);
+    const float t56 = 1.0f / s_x;
+    const float t57 = t55 ? t56 : 0.0f;
+    const float t58 = t54 * t57;
+    const float t59 = kf->D[4] * (t55 ? t35 * t57 : 1.0f);
+    const float t60 = kf->U[7] - kf->U[6] * t49;
+    const float t61 = t59 * t60;
+    const float s_y = t42 + t60 * t61;
+    const bool t62 = s_y > 1.1754944e-38f;
+    const float t63 = 1.0f / s_y;
+    const float t64 = t62 ? t63 : 0.0f;
+    const float t65 = t61 * t64;
+    const float d_speed = t59 * (t62 ? t42 * t64 : 1.0f);
+    const float t66 = kf->U[9] - kf->U[6] * t38;
+    const float u_gyro_bias_speed = t66 - t60 * t45;
+    const float t67 = kf->U[8] - kf->U[6] * t47;
+    const float u_heading_speed = t67 - t60 * t48;
+    const float u_y_speed = t60 - t60 * t50;
+    const float t68 = kf->U[6] - kf->U[6] * t52;
+    const float u_x_speed = t68 - t60 * t53;
+    const float t69 = (t49 + t58 * t60) * y_x;
+    const float nu_y = y_y - t69;
+    const float nis = (s_x > 0.0f ? y_x * (y_x * t56) : 0.0f)
+        + (s_y > 0.0f ? nu_y * (nu_y * t63) : 0.0f);
 
     /* state and innovation squared */
-    const float x_next = x + (t52 + t57 * t66) * y_x + (t53 + t63 * u_x_speed) * nu_y;
-    const float y_next = y + t67 + (t50 + t63 * u_y_speed) * nu_y;
-    const float heading_next = kf->x[VEHICLE_HEADING] + (t47 + t57 * t65) * y_x
-        + (t48 + t63 * u_heading_speed) * nu_y;
-    const float gyro_bias_next = kf->x[VEHICLE_GYRO_BIAS] + (t38 + t57 * t64) * y_x
-        + (t45 + t63 * u_gyro_bias_speed) * nu_y;
-    const float speed_next = kf->x[VEHICLE_SPEED] + t57 * y_x + t63 * nu_y;
-    const float t68 = vehicle_wrap(heading_next, 3.1415927f);
+    const float x_next = x + (t52 + t58 * t68) * y_x + (t53 + t65 * u_x_speed) * nu_y;
+    const float y_next = y + t69 + (t50 + t65 * u_y_speed) * nu_y;
+    const float heading_next = kf->x[VEHICLE_HEADING] + (t47 + t58 * t67) * y_x
+        + (t48 + t65 * u_heading_speed) * nu_y;
+    const float gyro_bias_next = kf->x[VEHICLE_GYRO_BIAS] + (t38 + t58 * t66) * y_x
+        + (t45 + t65 * u_gyro_bias_speed) * nu_y;
+    const float speed_next = kf->x[VEHICLE_SPEED] + t58 * y_x + t65 * nu_y;
+    const float t70 = vehicle_wrap(heading_next, 3.1415927f);
 
     /* guards */
     if (!vehicle_finite(y_x + y_y + s_x + s_y)) { return VEHICLE_NOT_FINITE; }
     if (s_x < 0.0f || s_y < 0.0f) { return VEHICLE_NOT_POSITIVE; }
 
     /* gate */
-    const bool t69 = nis > 13.815511f;
-    if (t69 && kf->gate_count_gnss < 10) {
+    const bool t71 = nis > 13.815511f;
+    if (t71 && kf->gate_count_gnss < 10) {
         kf->nis = nis;
         kf->gate_count_gnss = kf->gate_count_gnss + 1;
         return flags | VEHICLE_GATED;
     }
-    if (t69) { flags |= VEHICLE_ANOMALY; }
-    if (!vehicle_finite(nis + x_next + y_next + t68 + speed_next + gyro_bias_next)) {
+    if (t71) { flags |= VEHICLE_ANOMALY; }
+    if (!vehicle_finite(nis + x_next + y_next + t70 + speed_next + gyro_bias_next)) {
         return VEHICLE_NOT_FINITE;
     }
 
     /* store */
     kf->x[VEHICLE_X] = x_next;
     kf->x[VEHICLE_Y] = y_next;
-    kf->x[VEHICLE_HEADING] = t68;
+    kf->x[VEHICLE_HEADING] = t70;
     kf->x[VEHICLE_SPEED] = speed_next;
     kf->x[VEHICLE_GYRO_BIAS] = gyro_bias_next;
     kf->U[0] = u_x_y;
@@ -393,7 +395,7 @@ vehicle_status_t vehicle_update_speed(vehicle_t *kf, const vehicle_speed_t *z)
     const float t0 = 1.0f / s_v;
     const float t1 = kf->D[4] * t0;
     const float d_speed = kf->D[4] * (0.25f * t0);
-    const float nis = y_v * y_v / s_v;
+    const float nis = y_v * (y_v * t0);
 
     /* state and innovation squared */
     const float x_next = kf->x[VEHICLE_X] + t1 * u_x_speed * y_v;

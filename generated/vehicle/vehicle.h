@@ -16,8 +16,8 @@
  *
  * RAM 112 bytes a filter. Operations:
  *   predict       85 mul, 72 add, 17 div, 10 compare, 1 cos, 18 select, 1 sin, 1 wrap
- *   update_gnss   93 mul, 70 add, 11 div, 15 compare, 20 select, 1 wrap
- *   update_speed  13 mul, 13 add, 2 div, 3 compare, 1 wrap
+ *   update_gnss   95 mul, 70 add, 9 div, 15 compare, 20 select, 1 wrap
+ *   update_speed  14 mul, 13 add, 1 div, 3 compare, 1 wrap
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * a5822e6d9ac5ed4a4d2538f84efbcac13cc319382c754cc2bcacaf2b884dacda
@@ -50,7 +50,7 @@ enum {
 
 typedef float vehicle_real_t;
 
-/* 0, or a sum of flags; from VEHICLE_ERROR up the call has failed and has changed nothing */
+/* 0, or a sum of flags; from ..._ERROR up the call has failed and has changed nothing */
 typedef uint32_t vehicle_status_t;
 #define VEHICLE_OK             0x000u
 #define VEHICLE_REGULARIZED    0x001u /* a variance was limited, or taken to zero by round-off */
@@ -90,7 +90,8 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     vehicle_real_t x[5];             /* state */
-    vehicle_real_t U[10];            /* unit upper triangular factor, strict upper triangle by columns */
+    /* unit upper triangular factor, strict upper triangle by columns */
+    vehicle_real_t U[10];
     vehicle_real_t D[5];             /* diagonal factor: P = U D U^T */
     vehicle_parameters_t parameters; /* may be changed while the filter runs */
     vehicle_real_t nis;              /* normalised innovation squared of the last update */
@@ -126,7 +127,7 @@ vehicle_status_t vehicle_predict(vehicle_t *kf, const vehicle_inputs_t *u, vehic
  * @param z   x [m], y [m]
  * @return VEHICLE_OK, VEHICLE_ANOMALY, VEHICLE_GATED, or an error that leaves *kf as it was
  *
- * 93 mul, 70 add, 11 div, 15 compare, 20 select, 1 wrap.
+ * 95 mul, 70 add, 9 div, 15 compare, 20 select, 1 wrap.
  */
 vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z);
 
@@ -137,7 +138,7 @@ vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z);
  * @param z   v [m/s]
  * @return VEHICLE_OK, VEHICLE_ANOMALY, VEHICLE_GATED, or an error that leaves *kf as it was
  *
- * 13 mul, 13 add, 2 div, 3 compare, 1 wrap.
+ * 14 mul, 13 add, 1 div, 3 compare, 1 wrap.
  */
 vehicle_status_t vehicle_update_speed(vehicle_t *kf, const vehicle_speed_t *z);
 

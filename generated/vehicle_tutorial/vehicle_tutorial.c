@@ -183,7 +183,7 @@ vehicle_tutorial_status_t vehicle_tutorial_update_position(vehicle_tutorial_t *k
     const float u_px_th = t29 - t24 * t19;
     const float t30 = (t11 + t22 * t24) * y_x;
     const float nu_y = y_y - t30;
-    const float nis = y_x * y_x / s_x + nu_y * nu_y / s_y;
+    const float nis = y_x * (y_x * t21) + nu_y * (nu_y * t26);
 
     /* state and innovation squared */
     const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_th) * nu_y;
@@ -193,7 +193,7 @@ vehicle_tutorial_status_t vehicle_tutorial_update_position(vehicle_tutorial_t *k
     const float th_next = kf->x[VEHICLE_TUTORIAL_TH] + t22 * y_x + t27 * nu_y;
 
     /* guards */
-    if (!vehicle_tutorial_finite(nis + px_next + py_next + v_next + th_next)) {
+    if (!vehicle_tutorial_finite(px_next + py_next + v_next + th_next + nis)) {
         return VEHICLE_TUTORIAL_NOT_FINITE;
     }
     if (!(s_x > 0.0f) || !(s_y > 0.0f)) { return VEHICLE_TUTORIAL_NOT_POSITIVE; }

@@ -15,7 +15,7 @@
  *
  * RAM 60 bytes a filter. Operations:
  *   predict          58 mul, 35 add, 9 div, 3 compare, 1 cos, 6 select, 1 sin
- *   update_position  56 mul, 40 add, 8 div, 2 compare
+ *   update_position  58 mul, 40 add, 6 div, 2 compare
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * a474ff33431a763b81a09b8342d3676dd548ea0e0ec4da0bd7d9d103439ecde6
@@ -45,20 +45,24 @@ enum {
 
 typedef float vehicle_tutorial_real_t;
 
-/* 0, or a sum of flags; from VEHICLE_TUTORIAL_ERROR up the call has failed and has changed nothing */
+/* 0, or a sum of flags; from ..._ERROR up the call has failed and has changed nothing */
 typedef uint32_t vehicle_tutorial_status_t;
 #define VEHICLE_TUTORIAL_OK             0x000u
-#define VEHICLE_TUTORIAL_REGULARIZED    0x001u /* a variance was limited, or taken to zero by round-off */
+/* a variance was limited, or taken to zero by round-off */
+#define VEHICLE_TUTORIAL_REGULARIZED    0x001u
 #define VEHICLE_TUTORIAL_GLITCH_SMALL   0x002u /* an innovation was weighted down */
 #define VEHICLE_TUTORIAL_GLITCH_LARGE   0x004u /* an innovation was cut off */
-#define VEHICLE_TUTORIAL_ANOMALY        0x008u /* an innovation beyond its variance was taken all the same */
-#define VEHICLE_TUTORIAL_GATED          0x010u /* the measurement was refused; nothing but nis has changed */
+/* an innovation beyond its variance was taken all the same */
+#define VEHICLE_TUTORIAL_ANOMALY        0x008u
+/* the measurement was refused; nothing but nis has changed */
+#define VEHICLE_TUTORIAL_GATED          0x010u
 #define VEHICLE_TUTORIAL_SATURATED      0x020u /* a number was clipped to its range */
 #define VEHICLE_TUTORIAL_DT_CLAMPED     0x040u /* dt was outside of its limits and was clamped */
 #define VEHICLE_TUTORIAL_POINT_REJECTED 0x080u /* a sigma point was replaced */
 #define VEHICLE_TUTORIAL_ERROR          0x100u /* errors from here up */
 #define VEHICLE_TUTORIAL_NULL_ARGUMENT  0x100u /* a pointer is NULL */
-#define VEHICLE_TUTORIAL_NOT_FINITE     0x200u /* an argument or a value of the model is NaN or infinite */
+/* an argument or a value of the model is NaN or infinite */
+#define VEHICLE_TUTORIAL_NOT_FINITE     0x200u
 #define VEHICLE_TUTORIAL_NOT_POSITIVE   0x400u /* a variance or dt is not positive */
 
 typedef struct {
@@ -69,7 +73,8 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     vehicle_tutorial_real_t x[4]; /* state */
-    vehicle_tutorial_real_t U[6]; /* unit upper triangular factor, strict upper triangle by columns */
+    /* unit upper triangular factor, strict upper triangle by columns */
+    vehicle_tutorial_real_t U[6];
     vehicle_tutorial_real_t D[4]; /* diagonal factor: P = U D U^T */
     vehicle_tutorial_real_t nis;  /* normalised innovation squared of the last update */
 } vehicle_tutorial_t;
@@ -99,7 +104,7 @@ vehicle_tutorial_status_t vehicle_tutorial_predict(vehicle_tutorial_t *kf);
  * @param z   x [m], y [m]
  * @return VEHICLE_TUTORIAL_OK, or an error that leaves *kf as it was
  *
- * 56 mul, 40 add, 8 div, 2 compare.
+ * 58 mul, 40 add, 6 div, 2 compare.
  */
 vehicle_tutorial_status_t vehicle_tutorial_update_position(vehicle_tutorial_t *kf,
                                                            const vehicle_tutorial_position_t *z);

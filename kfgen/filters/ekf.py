@@ -16,7 +16,7 @@ from typing import Any
 from kfgen.filters import linalg, process
 from kfgen.filters.base import DT, INPUTS, KF, FilterCode, sensor_argument
 from kfgen.filters.layout import Covariance, Layout
-from kfgen.filters.numbers import assume_nonnegative, is_nonnegative, is_positive, is_zero
+from kfgen.filters.numbers import is_positive, is_zero, require_nonnegative
 from kfgen.filters.sensor import Innovation, linearise, needs_inputs, permuted
 from kfgen.filters.state import StateCode, counts_gated
 from kfgen.ir.program import Argument, Function, Store
@@ -30,8 +30,8 @@ from kfgen.scalars import Scalar
 # Measured with gcc 12 on a Cortex-M4F: its schedulers lengthen live ranges, and what no longer fits the registers
 # costs two instructions each time.
 LONG_FUNCTIONS = (
-    "Long straight-line functions: gcc keeps more of them in registers with the flags",
-    "  -O2 -fno-schedule-insns -fno-schedule-insns2 -flive-range-shrinkage -fno-tree-sink -frename-registers",
+    "Recommended with gcc, for these long functions without branches:",
+    "  -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers",
 )
 
 _TITLES = {"kf": "Kalman filter", "ekf": "Extended Kalman filter"}
@@ -100,6 +100,7 @@ class Ekf:
         x = self.state.confined(t, x)
         moved = {i for i, (value, before) in enumerate(zip(x, prior.x, strict=True)) if value.node is not before.node}
         t.section("guards")
+        self._guard_doubts(t, [*result.x, *(v for rows in (F, Q) for row in rows for v in row), *(d for _, d in noise)])
         self._guard_finite(t, [x[i] for i in sorted(moved)] + evidence)
         self._store(t, x, moved, P, after_predict=True)
         process.store_time(t, model, step)
@@ -123,18 +124,18 @@ class Ekf:
         t.section("innovation")
         innovation = permuted(linearise(t, model, sensor), self.order)
         for r in innovation.variances:
-            if not is_nonnegative(r):
-                t.guard(r < 0, "NOT_POSITIVE", "a measurement variance is negative")
-                assume_nonnegative(r)
+            require_nonnegative(r, "a measurement variance is negative")
         result = self._sequence(t, sensor, innovation)
         evidence = self._unconfined(result.x) + self.layout.evidence(result.P, after_predict=False)
         P = self._limited(t, result.P)
         x = self.state.confined(t, result.x)
         t.section("guards")
+        model_values = [v for row in innovation.rows for v in row if isinstance(v, Value)]
+        self._guard_doubts(t, [*innovation.y, *innovation.variances, *model_values])
         if sensor.gate is None:
             # nis shows whether z is finite, but for components that may have been skipped
             skippable = [v for v, r in zip(innovation.y, innovation.variances, strict=True) if not is_positive(r)]
-            self._guard_finite(t, [*skippable, result.nis, *x, *evidence])
+            self._guard_finite(t, [*skippable, *x, result.nis, *evidence])
             self._guard_positive(t, result.failures)
         else:
             # A far outlier may overflow nis and is gated all the same: z is tested by itself, and first.
@@ -189,7 +190,7 @@ class Ekf:
                 correction = linalg.dot(rows[c], moved)
                 nu = y[c] if is_zero(correction) else t.name(y[c] - correction, f"nu_{names[c]}")
                 moved = [linalg.plus(m, linalg.times(k, nu)) for m, k in zip(moved, K, strict=True)]
-                square = nu * nu / variance
+                square = nu * (nu * (1 / variance))  # the gain has made the reciprocal
                 if is_positive(variances[c]):
                     failures.append(~(variance > 0))
                 else:  # a direction already known, measured exactly: skipped
@@ -224,6 +225,13 @@ class Ekf:
     def _unconfined(self, x: list[Value]) -> list[Value]:
         """States before their bounds, which would hide what is infinite."""
         return [v for v, bounds in zip(x, self.model.bounds, strict=True) if bounds is not None]
+
+    def _guard_doubts(self, t: Trace, values: list[Value]) -> None:
+        """NOT_POSITIVE where a variance that had to be taken on trust is negative, after NOT_FINITE of the model."""
+        if t.doubts:
+            self._guard_finite(t, values)
+            for condition, why in t.doubts:
+                t.guard(condition, "NOT_POSITIVE", why)
 
     def _guard_inputs(self, t: Trace) -> None:
         self._guard_finite(t, [t.field(f"u.{name}") for name in self.model.inputs])

@@ -77,6 +77,13 @@ def _facts(trace: Trace) -> dict[Node, int]:
     return trace.signs
 
 
+def require_nonnegative(a: Number, why: str) -> None:
+    """Take a as not negative; where that is not known it is left to a guard (Trace.doubts)."""
+    if isinstance(a, Value) and not is_nonnegative(a):
+        a.trace.doubts.append((a < 0, why))
+        assume_nonnegative(a)
+
+
 def _sign(trace: Trace, node: Node) -> int:
     """2: positive, 1: not negative, 0: not known."""
     facts = _facts(trace)

@@ -9,9 +9,11 @@ from kfgen.filters import linalg
 from kfgen.filters.dual import Dual, Evaluator, seeds
 from kfgen.filters.exact import discretise
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.numbers import assume_nonnegative, assume_positive, is_nonnegative, is_zero
+from kfgen.filters.numbers import assume_positive, is_zero, require_nonnegative
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
+
+NEGATIVE = "a noise variance is negative"
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Ro
     else:
         U, weights = linalg.udu(part)
         for d in weights:
-            _guard_variance(t, d)
+            require_nonnegative(d, NEGATIVE)
         G = [
             [linalg.dot([row[k] for k in range(j + 1)], [*[U[k][j] for k in range(j)], 1]) for j in range(q)]
             for row in G
@@ -151,15 +153,9 @@ def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Ro
         column = [row[j] for row in G]
         weight = t.value(weight)
         if not is_zero(weight) and not all(is_zero(g) for g in column):
-            _guard_variance(t, weight)
+            require_nonnegative(weight, NEGATIVE)
             columns.append((column, weight if dt is None else weight * dt))
     return columns
-
-
-def _guard_variance(t: Trace, d: Value) -> None:
-    if isinstance(d, Value) and not is_nonnegative(d):
-        t.guard(d < 0, "NOT_POSITIVE", "a noise variance is negative")
-        assume_nonnegative(d)
 
 
 def _integrate(t: Trace, model: Model, prior: Prior, dt: Value, held: list[str]) -> list[Dual]:

@@ -9,7 +9,7 @@ import sympy
 from kfgen.filters import linalg, process
 from kfgen.filters.dual import Dual, Evaluator, seeds
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.numbers import assume_nonnegative, is_nonnegative, is_zero
+from kfgen.filters.numbers import is_zero, require_nonnegative
 from kfgen.ir.trace import Trace
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
@@ -84,9 +84,7 @@ def _decorrelated(t: Trace, y: Vector, H: Rows, R: Rows) -> Innovation:
     U, D = linalg.udu(R)
     D = [t.value(d) for d in D]
     for d in D:
-        if not is_nonnegative(d):
-            t.guard(d < 0, "NOT_POSITIVE", "R is not positive semidefinite")
-            assume_nonnegative(d)
+        require_nonnegative(d, "R is not positive semidefinite")
     y, H = list(y), [list(row) for row in H]
     for i in reversed(range(m)):
         for j in range(i + 1, m):

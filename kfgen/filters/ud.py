@@ -7,7 +7,7 @@ from fractions import Fraction
 from kfgen.filters import linalg
 from kfgen.filters.base import Block
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.numbers import assume_nonnegative, is_nonnegative, is_one, is_zero, select
+from kfgen.filters.numbers import assume_nonnegative, is_one, is_zero, require_nonnegative, select
 from kfgen.ir.trace import Array, Trace, Value
 
 
@@ -52,7 +52,7 @@ class UD:
         n = self.n
         UQ, DQ = self._factored_noise(t, Q)
         for _, d in noise:
-            self._guard_variance(t, d)
+            require_nonnegative(d, "a noise variance is negative")
         identity = all(is_zero(F[i][j]) and is_one(F[i][i]) for i in range(n) for j in range(n) if i != j)
         upper = all(is_zero(F[i][j]) for i in range(n) for j in range(i)) and all(is_one(F[i][i]) for i in range(n))
         if upper:
@@ -85,13 +85,8 @@ class UD:
         else:
             U, D = linalg.udu(Q)
         for d in D:
-            self._guard_variance(t, d)
+            require_nonnegative(d, "a noise variance is negative")
         return U, D
-
-    def _guard_variance(self, t: Trace, d: Value) -> None:
-        if not is_nonnegative(d):
-            t.guard(d < 0, "NOT_POSITIVE", "a noise variance is negative")
-            assume_nonnegative(d)
 
     def update(self, t: Trace, P: tuple[Rows, Vector], rows: Rows, variances: Vector
                ) -> tuple[tuple[Rows, Vector], Rows, Vector]:  # fmt: skip

@@ -117,7 +117,7 @@ class _Machine:
             case "or":
                 return self.value(node.args[0]) or self.value(node.args[1])
         args = [self.value(a) for a in node.args]
-        if node.kind == "int":
+        if node.kind == "int" and node.op in ("add", "sub", "mul"):
             a, b = args
             return a + b if node.op == "add" else a - b if node.op == "sub" else a * b
         if node.op in ("lt", "le") and node.args[0].kind == "int":

@@ -103,6 +103,7 @@ class Trace:
         self.block = Block()
         self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body
         self.names: dict[Node, str] = {}
+        self.doubts: list[tuple[Value, str]] = []  # conditions under which an assumption made fails, and why
         self.signs: dict[Node, int] = {}  # what is known of the sign of values (see filters.numbers)
 
         self.zero = self.wrapped(self.pool.zero)

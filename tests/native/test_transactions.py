@@ -72,8 +72,7 @@ def refused(calls: Calls, status: int, name: str, **changed: np.ndarray | None) 
     assert bytes(calls.kf) == before, f"{name} {changed}: the filter has changed"
 
 
-@pytest.mark.parametrize("scalar", SCALARS)
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("form", "scalar"), [*((form, "float") for form in FORMS), ("ud-bierman", "double")])
 def test_wrong_arguments(form, scalar):
     for group in ("exact", "libm") if scalar == "float" else ("exact",):
         for kf in library(group, form, scalar).values():
@@ -114,8 +113,7 @@ def test_steps_that_are_none(form):
     refused(limited, Status.NOT_FINITE, "predict", dt=np.array([-1.0]), u=np.array([math.nan]))
 
 
-@pytest.mark.parametrize("scalar", SCALARS)
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("form", "scalar"), [*((form, "float") for form in FORMS), ("full-joseph", "double")])
 def test_covariances_that_are_none(form, scalar):
     for name, kf in library("exact", form, scalar).items():
         calls = Calls(kf)
@@ -170,8 +168,7 @@ def test_spoiled_filters(form):
                                 assert np.isfinite(kf.x[np.isfinite(x)]).all(), place
 
 
-@pytest.mark.parametrize("scalar", SCALARS)
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("form", "scalar"), [*((form, "float") for form in FORMS), ("ud-bierman", "double")])
 def test_an_indefinite_covariance_is_not_positive(form, scalar):
     kf = library("exact", form, scalar)["cv4"]
     calls = Calls(kf)
@@ -183,7 +180,7 @@ def test_an_indefinite_covariance_is_not_positive(form, scalar):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_gated_update_leaves_all_but_nis(form):
-    for scalar in SCALARS:
+    for scalar in SCALARS if form in ("ud-bierman", "full-joseph") else ("float",):
         filters = library("exact", form, scalar)
         for name, sensor in (("switches", "range"), ("run_time", "place"), ("semidefinite", "norm")):
             kf = filters[name]
@@ -207,7 +204,7 @@ BLOW_UPS = {
     "power": ("x**(-2)", "x", 0.0),
     "root_slope": ("x + x**0.25", "x", 0.0),
     "asin": ("asin(x)", "x", 2.0),
-    "product": ("x*x*x*x*x*x*x*x", "x", 1e39),
+    "product": ("x*x*x*x*x*x*x*x", "x", 1e30),
 }
 
 
@@ -249,10 +246,8 @@ def test_models_that_blow_up(form):
         filters = load_filters([(spec, build(spec).files) for _, _, spec in pairs], flags=["-O0"])
         for (label, name, _), kf in zip(pairs, filters, strict=True):
             value = BLOW_UPS[name][2]
-            if not math.isfinite(np.float32(value)) and scalar == "float":
-                value = 1e30
-            if name == "product" and scalar == "double":
-                value = 1e100
+            if name == "product":
+                value = 1e30 if scalar == "float" else 1e100
             assert kf.set_state([value, 1]) == 0
             before = bytes(kf)
             status = kf.predict([0]) if label.startswith("f") else kf.update("s", [1, 1])
