@@ -43,7 +43,9 @@ ahrs_status_t ahrs_predict(ahrs_t *kf, const ahrs_inputs_t *u, ahrs_real_t dt)
     ahrs_status_t flags = AHRS_OK;
 
     /* arguments */
-    if (!ahrs_finite(u->gx + u->gy + u->gz)) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(u->gx)) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(u->gy)) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(u->gz)) { return AHRS_NOT_FINITE; }
     if (!ahrs_finite(dt)) { return AHRS_NOT_FINITE; }
     const bool t0 = dt < 0.001f;
     if (t0) { flags |= AHRS_DT_CLAMPED; }
@@ -1165,10 +1167,13 @@ ahrs_status_t ahrs_update_mag(ahrs_t *kf, const ahrs_mag_t *z)
 ahrs_status_t ahrs_set_state(ahrs_t *kf, const ahrs_real_t x[7])
 {
     if (kf == NULL || x == NULL) { return AHRS_NULL_ARGUMENT; }
-    if (!ahrs_finite(x[AHRS_Q0] + x[AHRS_Q1] + x[AHRS_Q2] + x[AHRS_Q3] + x[AHRS_BX] + x[AHRS_BY]
-        + x[AHRS_BZ])) {
-        return AHRS_NOT_FINITE;
-    }
+    if (!ahrs_finite(x[AHRS_Q0])) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(x[AHRS_Q1])) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(x[AHRS_Q2])) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(x[AHRS_Q3])) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(x[AHRS_BX])) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(x[AHRS_BY])) { return AHRS_NOT_FINITE; }
+    if (!ahrs_finite(x[AHRS_BZ])) { return AHRS_NOT_FINITE; }
     kf->x[AHRS_Q0] = x[AHRS_Q0];
     kf->x[AHRS_Q1] = x[AHRS_Q1];
     kf->x[AHRS_Q2] = x[AHRS_Q2];
@@ -1186,16 +1191,14 @@ ahrs_status_t ahrs_set_covariance(ahrs_t *kf, const ahrs_real_t P[49])
     float w[28];
 
     /* the upper triangle, column by column */
-    float total = 0.0f;
     for (int j = 0; j < 7; j++) {
         for (int i = 0; i < j + 1; i++) {
             const float value = P[7 * i + j];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
-            total = total + value;
+            if (!ahrs_finite(value)) { return AHRS_NOT_FINITE; }
         }
     }
-    if (!ahrs_finite(total)) { return AHRS_NOT_FINITE; }
 
     /* factor it: a pivot is zero up to round-off, or positive */
     for (int j = 7 - 1; j >= 0; j--) {

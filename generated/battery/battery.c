@@ -187,9 +187,9 @@ battery_status_t battery_update_terminal(battery_t *kf,
 battery_status_t battery_set_state(battery_t *kf, const battery_real_t x[3])
 {
     if (kf == NULL || x == NULL) { return BATTERY_NULL_ARGUMENT; }
-    if (!battery_finite(x[BATTERY_SOC] + x[BATTERY_V_FAST] + x[BATTERY_V_SLOW])) {
-        return BATTERY_NOT_FINITE;
-    }
+    if (!battery_finite(x[BATTERY_SOC])) { return BATTERY_NOT_FINITE; }
+    if (!battery_finite(x[BATTERY_V_FAST])) { return BATTERY_NOT_FINITE; }
+    if (!battery_finite(x[BATTERY_V_SLOW])) { return BATTERY_NOT_FINITE; }
     kf->x[BATTERY_SOC] = x[BATTERY_SOC];
     kf->x[BATTERY_V_FAST] = x[BATTERY_V_FAST];
     kf->x[BATTERY_V_SLOW] = x[BATTERY_V_SLOW];
@@ -203,16 +203,14 @@ battery_status_t battery_set_covariance(battery_t *kf, const battery_real_t P[9]
     float w[6];
 
     /* the upper triangle, column by column */
-    float total = 0.0f;
     for (int j = 0; j < 3; j++) {
         for (int i = 0; i < j + 1; i++) {
             const float value = P[3 * i + j];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
-            total = total + value;
+            if (!battery_finite(value)) { return BATTERY_NOT_FINITE; }
         }
     }
-    if (!battery_finite(total)) { return BATTERY_NOT_FINITE; }
 
     /* factor it: a pivot is zero up to round-off, or positive */
     for (int j = 3 - 1; j >= 0; j--) {

@@ -230,7 +230,10 @@ cv2d_status_t cv2d_update_camera(cv2d_t *kf, const cv2d_camera_t *z)
 cv2d_status_t cv2d_set_state(cv2d_t *kf, const cv2d_real_t x[4])
 {
     if (kf == NULL || x == NULL) { return CV2D_NULL_ARGUMENT; }
-    if (!cv2d_finite(x[CV2D_PX] + x[CV2D_PY] + x[CV2D_VX] + x[CV2D_VY])) { return CV2D_NOT_FINITE; }
+    if (!cv2d_finite(x[CV2D_PX])) { return CV2D_NOT_FINITE; }
+    if (!cv2d_finite(x[CV2D_PY])) { return CV2D_NOT_FINITE; }
+    if (!cv2d_finite(x[CV2D_VX])) { return CV2D_NOT_FINITE; }
+    if (!cv2d_finite(x[CV2D_VY])) { return CV2D_NOT_FINITE; }
     kf->x[CV2D_PX] = x[CV2D_PX];
     kf->x[CV2D_PY] = x[CV2D_PY];
     kf->x[CV2D_VX] = x[CV2D_VX];
@@ -245,7 +248,6 @@ cv2d_status_t cv2d_set_covariance(cv2d_t *kf, const cv2d_real_t P[16])
     float w[10];
 
     /* the upper triangle, column by column */
-    float total = 0.0f;
     for (int j = 0; j < 4; j++) {
         for (int i = 0; i < j + 1; i++) {
             const bool t0 = cv2d_order[j] < cv2d_order[i];
@@ -253,10 +255,9 @@ cv2d_status_t cv2d_set_covariance(cv2d_t *kf, const cv2d_real_t P[16])
                 + (t0 ? cv2d_order[i] : cv2d_order[j])];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
-            total = total + value;
+            if (!cv2d_finite(value)) { return CV2D_NOT_FINITE; }
         }
     }
-    if (!cv2d_finite(total)) { return CV2D_NOT_FINITE; }
 
     /* factor it: a pivot is zero up to round-off, or positive */
     for (int j = 4 - 1; j >= 0; j--) {

@@ -194,7 +194,10 @@ cv4_status_t cv4_update_position(cv4_t *kf, const cv4_position_t *z)
 cv4_status_t cv4_set_state(cv4_t *kf, const cv4_real_t x[4])
 {
     if (kf == NULL || x == NULL) { return CV4_NULL_ARGUMENT; }
-    if (!cv4_finite(x[CV4_PX] + x[CV4_PY] + x[CV4_VX] + x[CV4_VY])) { return CV4_NOT_FINITE; }
+    if (!cv4_finite(x[CV4_PX])) { return CV4_NOT_FINITE; }
+    if (!cv4_finite(x[CV4_PY])) { return CV4_NOT_FINITE; }
+    if (!cv4_finite(x[CV4_VX])) { return CV4_NOT_FINITE; }
+    if (!cv4_finite(x[CV4_VY])) { return CV4_NOT_FINITE; }
     kf->x[CV4_PX] = x[CV4_PX];
     kf->x[CV4_PY] = x[CV4_PY];
     kf->x[CV4_VX] = x[CV4_VX];
@@ -209,7 +212,6 @@ cv4_status_t cv4_set_covariance(cv4_t *kf, const cv4_real_t P[16])
     float w[10];
 
     /* the upper triangle, column by column */
-    float total = 0.0f;
     for (int j = 0; j < 4; j++) {
         for (int i = 0; i < j + 1; i++) {
             const bool t0 = cv4_order[j] < cv4_order[i];
@@ -217,10 +219,9 @@ cv4_status_t cv4_set_covariance(cv4_t *kf, const cv4_real_t P[16])
                 + (t0 ? cv4_order[i] : cv4_order[j])];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
-            total = total + value;
+            if (!cv4_finite(value)) { return CV4_NOT_FINITE; }
         }
     }
-    if (!cv4_finite(total)) { return CV4_NOT_FINITE; }
 
     /* factor it: a pivot is zero up to round-off, or positive */
     for (int j = 4 - 1; j >= 0; j--) {

@@ -41,10 +41,18 @@ gps_status_t gps_predict(gps_t *kf, const gps_inputs_t *u)
     if (kf == NULL || u == NULL) { return GPS_NULL_ARGUMENT; }
 
     /* arguments */
-    if (!gps_finite(u->s1x + u->s1y + u->s1z + u->s2x + u->s2y + u->s2z + u->s3x + u->s3y + u->s3z
-        + u->s4x + u->s4y + u->s4z)) {
-        return GPS_NOT_FINITE;
-    }
+    if (!gps_finite(u->s1x)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s1y)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s1z)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s2x)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s2y)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s2z)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s3x)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s3y)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s3z)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s4x)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s4y)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s4z)) { return GPS_NOT_FINITE; }
     const double drift = kf->x[GPS_DRIFT];
 
     /* model */
@@ -102,10 +110,18 @@ gps_status_t gps_predict(gps_t *kf, const gps_inputs_t *u)
 gps_status_t gps_update_range(gps_t *kf, const gps_range_t *z, const gps_inputs_t *u)
 {
     if (kf == NULL || z == NULL || u == NULL) { return GPS_NULL_ARGUMENT; }
-    if (!gps_finite(u->s1x + u->s1y + u->s1z + u->s2x + u->s2y + u->s2z + u->s3x + u->s3y + u->s3z
-        + u->s4x + u->s4y + u->s4z)) {
-        return GPS_NOT_FINITE;
-    }
+    if (!gps_finite(u->s1x)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s1y)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s1z)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s2x)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s2y)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s2z)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s3x)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s3y)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s3z)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s4x)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s4y)) { return GPS_NOT_FINITE; }
+    if (!gps_finite(u->s4z)) { return GPS_NOT_FINITE; }
 
     /* innovation */
     const double x = kf->x[GPS_X];
@@ -358,9 +374,11 @@ gps_status_t gps_update_range(gps_t *kf, const gps_range_t *z, const gps_inputs_
 gps_status_t gps_set_state(gps_t *kf, const gps_real_t x[5])
 {
     if (kf == NULL || x == NULL) { return GPS_NULL_ARGUMENT; }
-    if (!gps_finite(x[GPS_X] + x[GPS_Y] + x[GPS_Z] + x[GPS_CLOCK] + x[GPS_DRIFT])) {
-        return GPS_NOT_FINITE;
-    }
+    if (!gps_finite(x[GPS_X])) { return GPS_NOT_FINITE; }
+    if (!gps_finite(x[GPS_Y])) { return GPS_NOT_FINITE; }
+    if (!gps_finite(x[GPS_Z])) { return GPS_NOT_FINITE; }
+    if (!gps_finite(x[GPS_CLOCK])) { return GPS_NOT_FINITE; }
+    if (!gps_finite(x[GPS_DRIFT])) { return GPS_NOT_FINITE; }
     kf->x[GPS_X] = x[GPS_X];
     kf->x[GPS_Y] = x[GPS_Y];
     kf->x[GPS_Z] = x[GPS_Z];
@@ -376,7 +394,6 @@ gps_status_t gps_set_covariance(gps_t *kf, const gps_real_t P[25])
     double w[15];
 
     /* the upper triangle, column by column */
-    double total = 0.0;
     for (int j = 0; j < 5; j++) {
         for (int i = 0; i < j + 1; i++) {
             const bool t0 = gps_order[j] < gps_order[i];
@@ -384,10 +401,9 @@ gps_status_t gps_set_covariance(gps_t *kf, const gps_real_t P[25])
                 + (t0 ? gps_order[i] : gps_order[j])];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
-            total = total + value;
+            if (!gps_finite(value)) { return GPS_NOT_FINITE; }
         }
     }
-    if (!gps_finite(total)) { return GPS_NOT_FINITE; }
 
     /* factor it: a pivot is zero up to round-off, or positive */
     for (int j = 5 - 1; j >= 0; j--) {

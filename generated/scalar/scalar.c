@@ -78,16 +78,14 @@ scalar_status_t scalar_set_covariance(scalar_t *kf, const scalar_real_t P[1])
     float w[1];
 
     /* the upper triangle, column by column */
-    float total = 0.0f;
     for (int j = 0; j < 1; j++) {
         for (int i = 0; i < j + 1; i++) {
             const float value = P[i + j];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
-            total = total + value;
+            if (!scalar_finite(value)) { return SCALAR_NOT_FINITE; }
         }
     }
-    if (!scalar_finite(total)) { return SCALAR_NOT_FINITE; }
 
     /* factor it: a pivot is zero up to round-off, or positive */
     for (int j = 1 - 1; j >= 0; j--) {

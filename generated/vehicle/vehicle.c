@@ -57,7 +57,8 @@ vehicle_status_t vehicle_predict(vehicle_t *kf, const vehicle_inputs_t *u, vehic
     vehicle_status_t flags = VEHICLE_OK;
 
     /* arguments */
-    if (!vehicle_finite(u->yaw_rate + u->accel)) { return VEHICLE_NOT_FINITE; }
+    if (!vehicle_finite(u->yaw_rate)) { return VEHICLE_NOT_FINITE; }
+    if (!vehicle_finite(u->accel)) { return VEHICLE_NOT_FINITE; }
     if (!vehicle_finite(dt)) { return VEHICLE_NOT_FINITE; }
     const bool t0 = dt < 0.001f;
     if (t0) { flags |= VEHICLE_DT_CLAMPED; }
@@ -450,10 +451,11 @@ vehicle_status_t vehicle_update_speed(vehicle_t *kf, const vehicle_speed_t *z)
 vehicle_status_t vehicle_set_state(vehicle_t *kf, const vehicle_real_t x[5])
 {
     if (kf == NULL || x == NULL) { return VEHICLE_NULL_ARGUMENT; }
-    if (!vehicle_finite(x[VEHICLE_X] + x[VEHICLE_Y] + x[VEHICLE_HEADING] + x[VEHICLE_SPEED]
-        + x[VEHICLE_GYRO_BIAS])) {
-        return VEHICLE_NOT_FINITE;
-    }
+    if (!vehicle_finite(x[VEHICLE_X])) { return VEHICLE_NOT_FINITE; }
+    if (!vehicle_finite(x[VEHICLE_Y])) { return VEHICLE_NOT_FINITE; }
+    if (!vehicle_finite(x[VEHICLE_HEADING])) { return VEHICLE_NOT_FINITE; }
+    if (!vehicle_finite(x[VEHICLE_SPEED])) { return VEHICLE_NOT_FINITE; }
+    if (!vehicle_finite(x[VEHICLE_GYRO_BIAS])) { return VEHICLE_NOT_FINITE; }
     kf->x[VEHICLE_X] = x[VEHICLE_X];
     kf->x[VEHICLE_Y] = x[VEHICLE_Y];
     kf->x[VEHICLE_HEADING] = vehicle_wrap(x[VEHICLE_HEADING], 3.1415927f);
@@ -469,7 +471,6 @@ vehicle_status_t vehicle_set_covariance(vehicle_t *kf, const vehicle_real_t P[25
     float w[15];
 
     /* the upper triangle, column by column */
-    float total = 0.0f;
     for (int j = 0; j < 5; j++) {
         for (int i = 0; i < j + 1; i++) {
             const bool t0 = vehicle_order[j] < vehicle_order[i];
@@ -477,10 +478,9 @@ vehicle_status_t vehicle_set_covariance(vehicle_t *kf, const vehicle_real_t P[25
                 + (t0 ? vehicle_order[i] : vehicle_order[j])];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
-            total = total + value;
+            if (!vehicle_finite(value)) { return VEHICLE_NOT_FINITE; }
         }
     }
-    if (!vehicle_finite(total)) { return VEHICLE_NOT_FINITE; }
 
     /* factor it: a pivot is zero up to round-off, or positive */
     for (int j = 5 - 1; j >= 0; j--) {

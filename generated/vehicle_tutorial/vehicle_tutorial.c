@@ -221,10 +221,10 @@ vehicle_tutorial_status_t vehicle_tutorial_set_state(vehicle_tutorial_t *kf,
                                                      const vehicle_tutorial_real_t x[4])
 {
     if (kf == NULL || x == NULL) { return VEHICLE_TUTORIAL_NULL_ARGUMENT; }
-    if (!vehicle_tutorial_finite(x[VEHICLE_TUTORIAL_PX] + x[VEHICLE_TUTORIAL_PY]
-        + x[VEHICLE_TUTORIAL_V] + x[VEHICLE_TUTORIAL_TH])) {
-        return VEHICLE_TUTORIAL_NOT_FINITE;
-    }
+    if (!vehicle_tutorial_finite(x[VEHICLE_TUTORIAL_PX])) { return VEHICLE_TUTORIAL_NOT_FINITE; }
+    if (!vehicle_tutorial_finite(x[VEHICLE_TUTORIAL_PY])) { return VEHICLE_TUTORIAL_NOT_FINITE; }
+    if (!vehicle_tutorial_finite(x[VEHICLE_TUTORIAL_V])) { return VEHICLE_TUTORIAL_NOT_FINITE; }
+    if (!vehicle_tutorial_finite(x[VEHICLE_TUTORIAL_TH])) { return VEHICLE_TUTORIAL_NOT_FINITE; }
     kf->x[VEHICLE_TUTORIAL_PX] = x[VEHICLE_TUTORIAL_PX];
     kf->x[VEHICLE_TUTORIAL_PY] = x[VEHICLE_TUTORIAL_PY];
     kf->x[VEHICLE_TUTORIAL_V] = x[VEHICLE_TUTORIAL_V];
@@ -240,7 +240,6 @@ vehicle_tutorial_status_t vehicle_tutorial_set_covariance(vehicle_tutorial_t *kf
     float w[10];
 
     /* the upper triangle, column by column */
-    float total = 0.0f;
     for (int j = 0; j < 4; j++) {
         for (int i = 0; i < j + 1; i++) {
             const bool t0 = vehicle_tutorial_order[j] < vehicle_tutorial_order[i];
@@ -248,10 +247,9 @@ vehicle_tutorial_status_t vehicle_tutorial_set_covariance(vehicle_tutorial_t *kf
                 + (t0 ? vehicle_tutorial_order[i] : vehicle_tutorial_order[j])];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
-            total = total + value;
+            if (!vehicle_tutorial_finite(value)) { return VEHICLE_TUTORIAL_NOT_FINITE; }
         }
     }
-    if (!vehicle_tutorial_finite(total)) { return VEHICLE_TUTORIAL_NOT_FINITE; }
 
     /* factor it: a pivot is zero up to round-off, or positive */
     for (int j = 4 - 1; j >= 0; j--) {

@@ -17,6 +17,7 @@ from kfgen.filters.numbers import (
     is_positive,
     is_zero,
     reciprocal,
+    require_no_column,
     select,
 )  # fmt: skip
 
@@ -208,6 +209,9 @@ def udu(P: Rows) -> tuple[Rows, Vector]:
         if is_zero(D[j]) or is_negligible(D[j], scale[j]):
             D[j] = 0
             continue
+        if not is_positive(D[j]):
+            for i in range(j):
+                require_no_column(D[j], P[i][j], scale[i], scale[j])
         inverse = 1 / D[j] if is_positive(D[j]) else reciprocal(D[j])[1]
         for i in range(j):
             U[i][j] = times(P[i][j], inverse)

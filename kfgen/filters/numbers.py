@@ -13,6 +13,7 @@ from typing import Any
 from kfgen.ir.nodes import Node
 from kfgen.ir.trace import Trace, Value
 
+ROUND_OFF = Fraction(1, 10**6)  # of a squared correlation
 Number = Any  # a Value, or a Python or numpy number
 
 
@@ -82,6 +83,16 @@ def require_nonnegative(a: Number, why: str) -> None:
     if isinstance(a, Value) and not is_nonnegative(a):
         a.trace.doubts.append((a < 0, why))
         assume_nonnegative(a)
+
+
+def require_no_column(pivot: Number, entry: Number, row: Number, column: Number) -> None:
+    """Where a pivot is zero, what is left above it must be round-off: else the matrix was indefinite.
+
+    row, column: the diagonal entries that belong to the entry.
+    """
+    if isinstance(pivot, Value) and not is_zero(entry):
+        left = entry * entry > row * column * ROUND_OFF
+        pivot.trace.doubts.append(((pivot <= 0) & left, "a matrix of variances is indefinite"))
 
 
 def _sign(trace: Trace, node: Node) -> int:

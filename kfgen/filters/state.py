@@ -117,7 +117,8 @@ class StateCode:
         """Replace x; the covariance stays."""
         t = Trace()
         given = [t.element("x", i) for i in range(self.n)]
-        t.guard(~t.finite(sum(given[1:], given[0])), "NOT_FINITE")
+        for value in given:  # one by one: the sum of large numbers would overflow
+            t.guard(~t.finite(value), "NOT_FINITE")
         x = [v if p is None else t.wrap(v, p) for v, p in zip(given, self.model.periods, strict=True)]
         for i, value in enumerate(x):
             t.store("kf.x", i, value)
@@ -159,7 +160,6 @@ class StateCode:
         size = n * (n + 1) // 2
         P, W = t.array("p", size), t.array("w", size)
         t.section("the upper triangle, column by column")
-        total = t.variable("total", 0)
         with t.loop("j", 0, n) as j, t.loop("i", 0, j + 1) as i:
             a, b = place(i), place(j)
             low, high = select(b < a, b, a), select(b < a, a, b)
@@ -169,8 +169,7 @@ class StateCode:
             k = column(j) + i
             P[k] = value
             W[k] = value
-            total.set(total.get() + value)
-        t.guard(~t.finite(total.get()), "NOT_FINITE")
+            t.guard(~t.finite(value), "NOT_FINITE")
         t.section("factor it: a pivot is zero up to round-off, or positive")
         self._factor(t, P, W)
         t.section("store")

@@ -44,7 +44,8 @@ class Floating:
         return rounded if value > 0 else -rounded
 
     def literal(self, value: Fraction) -> str:
-        number = self.dtype(float(self.nearest(value)))
+        with np.errstate(over="ignore"):
+            number = self.dtype(float(self.nearest(value)))
         if not np.isfinite(number):
             raise OverflowError(f"{float(value):g} does not fit a {self.name}")
         text = np.format_float_scientific(number, unique=True, trim="-")
