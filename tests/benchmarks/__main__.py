@@ -12,7 +12,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 
 from kfgen.commands.build import aligned
-from tests.benchmarks.budgets import CEILINGS, GENERATION, PROBLEMS, cost
+from tests.benchmarks.budgets import CEILINGS, GENERATION, INERTIAL, PROBLEMS, cost, inertial_cost
 from tests.benchmarks.generation import cold_build
 from tests.benchmarks.measure import Cost, missing
 
@@ -34,6 +34,9 @@ def main(arguments: list[str]) -> int:
         print("\n".join(aligned([HEAD, *(_row(*key, found, ceilings=True) for key, found in costs.items())])))
         print("\nmeasured/ceiling, in bytes; instructions of one predict and one update, the mean over the log")
     print(f"\nkfgen build of chain16 in a cold process: {wall:.2f} s, {processor:.2f} s of them processor time")
+    seconds = cold_build(INERTIAL.read_text())[0]
+    count = inertial_cost().instructions["predict"][0]
+    print(f"24-state inertial filter, full: predict {count} instructions, built in {seconds:.2f} s")
     over = [f"{', '.join(key)}: {'; '.join(CEILINGS[key].exceeded(found))}" for key, found in costs.items()
             if CEILINGS[key].exceeded(found)]  # fmt: skip
     if wall > GENERATION:

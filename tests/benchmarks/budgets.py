@@ -9,17 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from kfgen.generate import build
 from kfgen.override import override
 from kfgen.simulate import simulate
-from kfgen.spec import loads
+from kfgen.spec import load, loads
 from tests.benchmarks.measure import Cost, measure, recommended_flags
 from tests.oracle import problems
 
 ROWS = 60
 FLAGS_FROM = 8  # states from which the flags that the emitted header recommends are used
 GENERATION = 2.0  # s: chain16 in ud form, a cold process
+INERTIAL = Path(__file__).with_name("ins24.yaml")  # full + standard
+INERTIAL_GENERATION = 6.0  # s
+INERTIAL_PREDICT = 4200  # instructions
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,13 @@ CEILINGS: Mapping[tuple[str, str], Ceiling] = {
     (name, form): Ceiling(*most, _RAM[PROBLEMS[name].n], _STACK[PROBLEMS[name].n])
     for (name, form), most in _MOST.items()
 }
+
+
+def inertial_cost() -> Cost:
+    """Measure the 24-state inertial filter."""
+    spec = load(INERTIAL)
+    files = build(spec).files
+    return measure(spec, files, simulate(spec, 10), recommended_flags(files[f"{spec.name}.h"]))
 
 
 def cost(name: str, form: str) -> Cost:

@@ -7,7 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.benchmarks.budgets import CEILINGS, GENERATION, PROBLEMS, cost
+from tests.benchmarks.budgets import (
+    CEILINGS,
+    GENERATION,
+    INERTIAL,
+    INERTIAL_GENERATION,
+    INERTIAL_PREDICT,
+    PROBLEMS,
+    cost,
+    inertial_cost,
+)
 from tests.benchmarks.generation import cold_build
 from tests.benchmarks.measure import missing, recommended_flags
 
@@ -38,6 +47,12 @@ def test_cost(name, form):
 def test_generation_time():
     # processor time and twice the ceiling: the machine that runs this may be slow, and busy with other tests
     assert cold_build(PROBLEMS["chain16"].spec)[1] <= 2 * GENERATION
+
+
+@pytest.mark.usefixtures("_tools")
+def test_inertial_filter():
+    assert inertial_cost().instructions["predict"][0] <= INERTIAL_PREDICT
+    assert cold_build(INERTIAL.read_text(), 1)[1] <= 2 * INERTIAL_GENERATION
 
 
 def test_flags_are_read_from_the_header():
