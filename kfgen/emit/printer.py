@@ -109,9 +109,6 @@ class Printer:
     def _call(self, node: Node) -> str:
         args = [self.expression(a) for a in node.args]
         op = node.op
-        if op == "hypot":
-            squares = " + ".join(f"{self.expression(a, _UNARY)} * {self.expression(a, _UNARY)}" for a in node.args)
-            return f"{self.scalar.function('sqrt')}({squares})"
         if op in self.scalar.helper_ops:
             self.helpers.add(op)
             if op == "wrap":

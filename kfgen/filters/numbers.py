@@ -123,7 +123,7 @@ def _derive(trace: Trace, node: Node) -> int:
             return max(1, signs[0])
         case "exp":
             return 2
-        case "abs" | "hypot":
+        case "abs":
             return 1
         case "select" | "min":
             return min(signs)

@@ -59,8 +59,6 @@ def fold(op: str, values: list[Fraction]) -> Fraction | None:
         return Fraction(a.numerator // a.denominator)
     if op in ("min", "max"):
         return min(values) if op == "min" else max(values)
-    if op == "hypot":
-        return evaluate(mpmath.sqrt, sum((v * v for v in values), Fraction(0)))
     if op == "pow":
         return evaluate(mpmath.power, *values)
     return evaluate(getattr(mpmath, op), *values)

@@ -18,13 +18,6 @@ from kfgen.ir import constants
 
 REAL, BOOL, INT = "real", "bool", "int"
 
-COMPARISONS = ("lt", "le")  # gt and ge are these with the operands exchanged
-LOGIC = ("and", "or", "not")
-UNARY = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "abs",
-         "floor", "sign")  # fmt: skip
-BINARY = ("atan2", "min", "max", "hypot", "pow")
-ARITHMETIC = ("add", "sub", "mul", "div", "neg")
-
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -203,7 +196,7 @@ class Pool:
     # functions -------------------------------------------------------------------------------------
 
     def function(self, op: str, *args: Node) -> Node:
-        """sqrt, sin, ..., atan2, min, max, hypot, pow; of constants exactly (to 60 digits)."""
+        """sqrt, sin, ..., atan2, min, max, pow; of constants exactly (to 60 digits)."""
         values = [a.constant for a in args]
         if all(v is not None for v in values):
             folded = constants.fold(op, [v for v in values if v is not None])

@@ -12,7 +12,7 @@ import sympy
 from sympy import Function, Integer, Rational, S
 
 
-class KfFunction(Function):  # type: ignore[misc]
+class KfFunction(Function):  # type: ignore[misc] # SymPy has no types
     """Base: no evaluation, no assumption beyond being a number."""
 
     @classmethod

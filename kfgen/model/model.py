@@ -67,7 +67,6 @@ class Model:
     ceilings: tuple[Fraction | None, ...]
     parameters: tuple[tuple[str, Fraction], ...]
     dt: Fraction | None  # None: given at run time
-    dt_nominal: Fraction | None = None
     dt_limits: tuple[Fraction | None, Fraction | None] = (None, None)
     _partials: dict[Symbolic, tuple[tuple[Symbolic, Symbolic], ...]] = field(default_factory=dict, repr=False)
 
@@ -193,7 +192,6 @@ class _Builder:
             ceilings=self.limits(spec.filter.variance_ceiling),
             parameters=tuple(parameters),
             dt=fixed,
-            dt_nominal=nominal,
             dt_limits=limits,
         )
         return model

@@ -125,7 +125,6 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "div": lambda s, d, a, b: a / b,
     "neg": lambda s, d, a: -a,
     "abs": lambda s, d, a: abs(a),
-    "hypot": lambda s, d, *a: np.sqrt(s._sum(tuple((1, 2) for _ in a), [v for v in a for _ in (0, 1)])),
     "min": lambda s, d, a, b: b if b < a else a,
     "max": lambda s, d, a, b: b if b > a else a,
     "sign": lambda s, d, a: s.dtype((a > 0) * 1 - (a < 0) * 1),

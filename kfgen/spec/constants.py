@@ -25,7 +25,7 @@ _MAX_BITS = 8_000  # of an exact fraction; beyond it, 60 digits
 _HUGE, _TINY = Fraction(10) ** 400, Fraction(1, 10**400)
 
 
-class NotConstant(KfgenError):  # noqa: N818
+class NotConstant(KfgenError):  # noqa: N818 - a finding about a formula, which callers expect
     """The expression has a name without a value; `name` is that name."""
 
     def __init__(self, name: str) -> None:
@@ -33,7 +33,7 @@ class NotConstant(KfgenError):  # noqa: N818
         self.name = name
 
 
-class NoValue(KfgenError):  # noqa: N818
+class NoValue(KfgenError):  # noqa: N818 - likewise
     """The expression has no finite real value: division by zero, root of a negative number, too large.
 
     The text is a sentence about the expression, `hint` the cure.
