@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kfgen.reference.adapt import NOTHING, Adaptation, Adapted
 from kfgen.reference.dual import Matrix, Vector, value_of
 from kfgen.reference.evaluate import Closure
 from kfgen.reference.linalg import lower_root, udu
@@ -23,11 +24,16 @@ from kfgen.spec.tree import Expression
 
 @dataclass(frozen=True)
 class Estimate:
-    """x (n), P (n, n), and whatever else the algorithm keeps between two steps."""
+    """x (n), P (n, n), and whatever else the algorithm keeps between two steps.
+
+    memory: what belongs to this very x and P, and is dropped when either is set. adapted: noise covariances
+    learnt so far, which outlast that.
+    """
 
     x: Vector
     P: Matrix
     memory: object = None
+    adapted: Adapted = NOTHING
 
 
 @dataclass(frozen=True)
@@ -48,11 +54,21 @@ class Correction:
 
 
 class Algorithm(ABC):
-    """A filter type. Its methods raise StepError, or return finite, wrapped, bounded estimates."""
+    """A filter type. Its methods raise StepError, or return finite, wrapped, bounded estimates.
+
+    fixed_covariance: whether P never changes, and so cannot be set.
+    """
+
+    fixed_covariance = False
 
     def __init__(self, model: Model) -> None:
         self.model = model
         self.limits = Limits(model)
+        self.adaptation = Adaptation(model)
+
+    def initial(self) -> Estimate:
+        """The estimate after init."""
+        return Estimate(self.model.x0, self.model.P0, adapted=self.adaptation.initial())
 
     @abstractmethod
     def predict(self, estimate: Estimate, context: Context) -> tuple[Estimate, Status]:

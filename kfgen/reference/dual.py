@@ -117,6 +117,13 @@ def jacobian(numbers: Sequence[Number], k: int) -> Matrix:
     return rows
 
 
+def hessian(number: Number, k: int) -> Matrix:
+    """The Hessian (k, k) of a number of k variables; that of a constant is 0."""
+    if isinstance(number, Dual) and number.hessian is not None:
+        return number.hessian
+    return np.zeros((k, k))
+
+
 def values(numbers: Sequence[Number]) -> Vector:
     """Values of m numbers as a vector (m)."""
     return np.array([value_of(number) for number in numbers], dtype=np.float64)

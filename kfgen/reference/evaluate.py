@@ -8,6 +8,7 @@ no harm. Comparisons look at values only; a comparison with NaN is false.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from kfgen.reference import dual
@@ -103,6 +104,15 @@ class Scope:
         if tree.op == "pow" and exacts[1] is not None:
             return None, _constant_power(parts[0][1], to_float(exacts[1]))
         return None, _operation(tree, [closure for _, closure in parts])
+
+
+def renamed(tree: Tree, hidden: Mapping[str, str]) -> Tree:
+    """The tree with other names, by which a formula's own variables hide what has their names outside."""
+    if isinstance(tree, Name):
+        return Name(hidden.get(tree.name, tree.name))
+    if isinstance(tree, Call):
+        return replace(tree, args=tuple(renamed(argument, hidden) for argument in tree.args))
+    return tree
 
 
 def _constant(exact: Exact) -> tuple[Exact, Closure]:

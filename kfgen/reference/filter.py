@@ -3,50 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
-from kfgen.reference.algorithm import Algorithm, Correction, Estimate
+from kfgen.reference.algorithm import Algorithm, Correction
 from kfgen.reference.clock import Clock
 from kfgen.reference.dual import Matrix, Vector
-from kfgen.reference.linalg import udu
+from kfgen.reference.linalg import lower_root, udu
 from kfgen.reference.log import Run, replay
 from kfgen.reference.model import Context, Model, fixed_step
+from kfgen.reference.parameters import Parameters
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.types import Gate, Spec
-
-
-class Parameters(MutableMapping[str, float]):
-    """The run-time parameters by name: values may be changed, names neither added nor removed."""
-
-    def __init__(self, values: Mapping[str, float]) -> None:
-        self._values = dict(values)
-
-    def __getitem__(self, name: str) -> float:
-        return self._values[name]
-
-    def __setitem__(self, name: str, value: float) -> None:
-        if name not in self._values:
-            raise KeyError(name)
-        self._values[name] = float(value)
-
-    def __delitem__(self, name: str) -> None:
-        raise TypeError("parameters cannot be removed")
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __repr__(self) -> str:
-        return f"Parameters({self._values})"
 
 
 @dataclass(frozen=True)
@@ -79,6 +53,8 @@ class ReferenceFilter:
         t: seconds since init.
         parameters: name -> value, changeable; back at the spec's values after init.
         gate_count: sensor -> rejections in a row.
+        R: sensor -> (m, m), Q (n, n): the adapted noise covariances (`adapt_R`, `adapt_Q` only).
+        sqrt_covariance (n, n): the lower Cholesky factor of P (`covariance: sqrt` only).
     Steps return the status bits as an int and never raise for what the filter meets; a call of the wrong
     shape (a missing u, an unknown sensor) raises TypeError, ValueError or KeyError.
     """
@@ -118,12 +94,37 @@ class ReferenceFilter:
         return self._estimate.P.copy()
 
     @property
+    def sqrt_covariance(self) -> Matrix:
+        self._require("sqrt_covariance", self.spec.filter.covariance == "sqrt", "covariance: sqrt")
+        return lower_root(self._estimate.P)
+
+    @property
+    def R(self) -> dict[str, Matrix]:
+        self._require("R", self.algorithm.adaptation.R, "adapt_R")
+        return {name: R.copy() for name, R in self._estimate.adapted.R.items()}
+
+    @property
+    def Q(self) -> Matrix:
+        Q = self._estimate.adapted.Q
+        self._require("Q", Q is not None, "adapt_Q")
+        assert Q is not None
+        return Q.copy()
+
+    @property
     def t(self) -> float:
         return self._clock.now
 
+    def _require(self, what: str, there: bool, option: str) -> None:
+        if not there:
+            raise AttributeError(f"filter {self.spec.name} has no {what}; its spec has no `{option}`")
+
+    def _require_variable(self) -> None:
+        if self.algorithm.fixed_covariance:
+            raise AttributeError(f"filter {self.spec.name} has a fixed covariance; its spec has `gain: steady`")
+
     def init(self) -> int:
         """Back to the spec: estimate, parameters, time, counters."""
-        self._estimate = Estimate(self.model.x0, self.model.P0)
+        self._estimate = self.algorithm.initial()
         self.parameters = Parameters(self.model.values)
         # without a dt the spec has no seconds: t then counts steps
         self._clock = Clock(Fraction(1) if self.spec.dt is None else self._fixed)
@@ -138,23 +139,48 @@ class ReferenceFilter:
         new = np.array(x, dtype=np.float64).reshape(self.model.n)
         if not np.all(np.isfinite(new)):
             return int(Status.NOT_FINITE)
-        self._estimate = Estimate(self.model.wrap(new), self._estimate.P)
+        self._estimate = replace(self._estimate, x=self.model.wrap(new), memory=None)
         return int(Status.OK)
 
     def set_covariance(self, P: ArrayLike) -> int:
         """Sets P (n, n) from its upper triangle; NOT_FINITE and NOT_POSITIVE leave the filter as it was."""
+        self._require_variable()
         given = np.array(P, dtype=np.float64).reshape(self.model.n, self.model.n)
         new = np.triu(given) + np.triu(given, 1).T
         try:
             if not np.all(np.isfinite(new)):
                 raise StepError(Status.NOT_FINITE)
-            U, D = udu(new, computed=False)
+            with np.errstate(all="ignore"):
+                U, D = udu(new, computed=False)
         except StepError as error:
             return int(error.status)
         if np.any(D == 0.0):
             # a pivot that is negative or positive only by rounding is the zero it stands for
             new = (U * D) @ U.T
-        self._estimate = Estimate(self._estimate.x, new)
+        self._estimate = replace(self._estimate, P=new, memory=None)
+        return int(Status.OK)
+
+    def set_sqrt_covariance(self, S: ArrayLike) -> int:
+        """Sets P = S S^T from the lower triangle of S (n, n) (`covariance: sqrt` only).
+
+        NOT_FINITE leaves the filter as it was. The sign of a column makes no difference to P.
+        """
+        self._require("set_sqrt_covariance", self.spec.filter.covariance == "sqrt", "covariance: sqrt")
+        self._require_variable()
+        root = np.tril(np.array(S, dtype=np.float64).reshape(self.model.n, self.model.n))
+        with np.errstate(all="ignore"):
+            new = root @ root.T
+        if not np.all(np.isfinite(new)):
+            return int(Status.NOT_FINITE)
+        self._estimate = replace(self._estimate, P=new, memory=None)
+        return int(Status.OK)
+
+    def redraw(self) -> int:
+        """Draws the points that predict has kept for an update anew, from x and P (`redraw: false` only)."""
+        points = self.spec.filter.sigma_points
+        self._require("redraw", points is not None and not points.redraw, "redraw: false")
+        # without kept points an update draws its own
+        self._estimate = replace(self._estimate, memory=None)
         return int(Status.OK)
 
     def predict(self, u: ArrayLike | None = None, dt: float | None = None) -> int:
@@ -173,6 +199,8 @@ class ReferenceFilter:
                 estimate, warnings = self.algorithm.predict(self._estimate, context)
         except StepError as error:
             return int(error.status)
+        except np.linalg.LinAlgError:  # numbers near the end of their range
+            return int(Status.NOT_FINITE)
         self._estimate, self._clock = estimate, self._clock.advanced(step)
         return int(flags | warnings)
 
@@ -196,6 +224,8 @@ class ReferenceFilter:
                 return int(self._judge(reading))
         except StepError as error:
             return int(error.status)
+        except np.linalg.LinAlgError:  # numbers near the end of their range
+            return int(Status.NOT_FINITE)
 
     def run(self, log: Mapping[str, Sequence[float]]) -> Run:
         """Replays a log from the filter's present state: see kfgen.reference.log.replay."""
@@ -248,7 +278,7 @@ class ReferenceFilter:
         x = self.x
         for state, component in rule.states.items():
             x[self.model.index[state]] = reading.z[reading.sensor.components.index(component)]
-        self._estimate = Estimate(self.model.wrap(self.model.clip(x)), self._estimate.P)
+        self._estimate = replace(self._estimate, x=self.model.wrap(self.model.clip(x)), memory=None)
         self._uninitialised = False
         self.nis = 0.0
         return Status.OK

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kfgen.reference.dual import Matrix, Vector
+from kfgen.reference.influence import Influence
 from kfgen.reference.linalg import EPS, symmetric, udu
 from kfgen.reference.status import Status, StepError
 
@@ -25,28 +26,52 @@ _WELL_CONDITIONED = 1e4
 class Update:
     """What a linear update makes of an estimate.
 
-    dx (n): correction of the state. P (n, n): the new covariance. nis: y^T S^-1 y over the components in
-    use. log_likelihood: ln N(y; 0, S) over the same.
+    dx (n): correction of the state. P (n, n): the new covariance. nis, log_likelihood: y^T S^-1 y and
+    ln N(y; 0, S) over the components in use, or, where the Rules change anything, the sums of nu^2 / s and of
+    the logarithms over the scalars as they were processed. flags: what the Rules raised. steps (k, n): the
+    corrections K_i nu_i of the scalars, where they were processed one by one.
     """
 
     dx: Vector
     P: Matrix
     nis: float
     log_likelihood: float
+    flags: Status = Status.OK
+    steps: Matrix | None = None
 
 
-def update(P: Matrix, H: Matrix, R: Matrix, y: Vector) -> Update:
+@dataclass(frozen=True)
+class Rules:
+    """What is done to each scalar measurement beside the textbook's update.
+
+    influence: the innovation's influence function. chi2: the threshold above which the covariance is
+    inflated. floor: smallest innovation variance. limit: largest |K_i|. consider: states whose gain is 0.
+    one_by_one: process scalars even where the whole vector would do, for the sake of `Update.steps`.
+    """
+
+    influence: Influence | None = None
+    chi2: float | None = None
+    floor: float = 0.0
+    limit: float = math.inf
+    consider: tuple[int, ...] = ()
+    one_by_one: bool = False
+
+
+PLAIN = Rules()
+
+
+def update(P: Matrix, H: Matrix, R: Matrix, y: Vector, rules: Rules = PLAIN) -> Update:
     """The update of covariance P (n, n) by the innovation y (m) with H (m, n) and R (m, m).
 
     R must be positive semidefinite: a negative pivot raises NOT_POSITIVE.
     """
     _, D = udu(R)
     S = symmetric(H @ P @ H.T + R)
-    if len(y) > 1 and np.all(D > 0.0) and np.all(S.diagonal() > 0.0):
+    if rules == PLAIN and len(y) > 1 and np.all(D > 0.0) and np.all(S.diagonal() > 0.0):
         root = np.sqrt(S.diagonal())
         if np.linalg.cond(S / np.outer(root, root)) <= _WELL_CONDITIONED:
             return batch(P, H, R, y)
-    return sequential(P, H, R, y)
+    return sequential(P, H, R, y, rules)
 
 
 def batch(P: Matrix, H: Matrix, R: Matrix, y: Vector) -> Update:
@@ -67,41 +92,77 @@ def batch(P: Matrix, H: Matrix, R: Matrix, y: Vector) -> Update:
     )
 
 
-def sequential(P: Matrix, H: Matrix, R: Matrix, y: Vector) -> Update:
+def sequential(P: Matrix, H: Matrix, R: Matrix, y: Vector, rules: Rules = PLAIN) -> Update:
     """The components one by one, after decorrelation by R = U diag(r) U^T (Bierman 1977, section V.2).
 
-    The innovation of component i is y_i - H_i dx, dx being the correction made by those before it. A
-    component with r = 0 along a direction that is already known exactly (s = 0 to round-off) is skipped: it
-    adds nothing to nis or to the likelihood. An innovation variance below that raises NOT_POSITIVE.
+    The innovation nu of component i is y_i - H_i dx, dx being the correction made by those before it. With
+    c = h P h^T each scalar is treated in this order:
+
+    * robust: nu <- sigma psi(nu / sigma) with sigma = sqrt(r), and g = psi' its weight; s = r + g c (a
+      generalised linear model: Fahrmeir & Kaufmann 1991). An exact measurement (r = 0) is believed.
+    * adaptive: where g nu^2 / chi2 > s, P <- a P with the a that makes s the left side; not where c = 0.
+    * a floor of s, to which r is raised.
+    * K = P h^T / s, held at 0 for considered states (Schmidt 1966), limited; P in Joseph's form with that K.
+
+    A component with r = 0 along a direction that is already known exactly (c = 0 to round-off) is skipped,
+    unless there is a floor: it adds nothing to nis, to the likelihood, or to the flags. A variance c below
+    that raises NOT_POSITIVE.
     """
-    U, r = udu(R)
+    U, variances = udu(R)
     rows = np.linalg.solve(U, H)
     innovations = np.linalg.solve(U, y)
     dx = np.zeros(len(P))
+    steps = []
     nis = log_likelihood = 0.0
-    for h, variance, innovation in zip(rows, r, innovations, strict=True):
+    flags = Status.OK
+    for h, r, innovation in zip(rows, map(float, variances), innovations, strict=True):
         known = 8.0 * len(P) * EPS * float(np.abs(h) @ np.abs(P) @ np.abs(h))
         c = float(h @ P @ h)
         if c < -known:
             raise StepError(Status.NOT_POSITIVE)
-        if variance == 0.0 and c <= known:
+        if r == 0.0 and c <= known and rules.floor == 0.0:
             continue
         # within round-off of 0 the variance of h x is 0: what is left of it must not become a gain
-        c = max(c, 0.0)
-        s = c + variance
+        certain, c = c <= known, max(c, 0.0)
+        nu, g = float(innovation - h @ dx), 1.0
+        if rules.influence is not None and r > 0.0:
+            nu, g, glitch = _weighed(nu, math.sqrt(r), rules.influence)
+            flags |= glitch
+        s = r + g * c
+        if rules.chi2 is not None and not certain and g * c > 0.0 and g * nu * nu / rules.chi2 > s:
+            inflation = 1.0 + (g * nu * nu / rules.chi2 - s) / (g * c)
+            P, c = inflation * P, inflation * c
+            s = r + g * c
+            flags |= Status.ANOMALY
+        if s < rules.floor:
+            r, s = r + rules.floor - s, rules.floor
+            flags |= Status.REGULARIZED
         K = P @ h / s
-        nu = float(innovation - h @ dx)
-        P = _joseph(P, K, h, float(variance))
+        K[list(rules.consider)] = 0.0
+        K = np.clip(K, -rules.limit, rules.limit)
+        P = _joseph(P, K, h, r, g)
+        steps.append(K * nu)
         dx = dx + K * nu
         nis += nu * nu / s
         log_likelihood -= 0.5 * (math.log(2.0 * math.pi) + nu * nu / s + math.log(s))
-    return Update(dx, P, nis, log_likelihood)
+    return Update(dx, P, nis, log_likelihood, flags, np.array(steps).reshape(-1, len(P)))
 
 
-def _joseph(P: Matrix, K: Vector, h: Vector, r: float) -> Matrix:
-    """(I - K h) P (I - K h)^T + r K K^T for one component with variance r."""
-    A = np.eye(len(P)) - np.outer(K, h)
-    updated = symmetric(A @ P @ A.T + r * np.outer(K, K))
+def _weighed(nu: float, sigma: float, influence: Influence) -> tuple[float, float, Status]:
+    """sigma psi(nu / sigma), its weight g, and the flag that says how far the innovation was doubted."""
+    psi, g = influence(nu / sigma)
+    if g == 0.0:
+        return sigma * psi, g, Status.GLITCH_LARGE
+    return sigma * psi, g, Status.GLITCH_SMALL if g < 1.0 else Status.OK
+
+
+def _joseph(P: Matrix, K: Vector, h: Vector, r: float, g: float = 1.0) -> Matrix:
+    """(I - g K h) P (I - g K h)^T + g r K K^T for one component with variance r and weight g.
+
+    It holds for every K; with K = P h^T / s it is P - g s K K^T.
+    """
+    A = np.eye(len(P)) - g * np.outer(K, h)
+    updated = symmetric(A @ P @ A.T + g * r * np.outer(K, K))
     if r == 0.0:
         # An exact measurement can leave a variance of 0, of which float64 leaves the square of a rounding
         # error. Below that bound a variance is nothing but rounding, and is made the 0 that it stands for.

@@ -19,8 +19,8 @@ from kfgen.spec.tree import Expression
 from kfgen.spec.types import Matrix as Formulas
 from kfgen.spec.types import Noise, Spec
 
-# variables of an own residual; a state of the same name is hidden inside it
-Z, PREDICTED = " z", " h"
+# variables of an own residual and of an influence function; what has the same name outside is hidden inside
+Z, PREDICTED, INNOVATION = " z", " h", " e"
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,8 @@ class Model:
         }
         noises = [noise.name for sensor in spec.measurements for noise in sensor.noise]
         noises += [noise.name for noise in spec.noise]
-        self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, "t", "dt", Z, PREDICTED))
+        own = ("t", "dt", Z, PREDICTED, INNOVATION)
+        self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, *own))
         self._noise_slots = tuple(self.scope.slots[name] for name in noises)
         for definition in spec.let:
             self.scope.define(definition.name, definition.value)

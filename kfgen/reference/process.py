@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from kfgen.errors import SpecError
-from kfgen.reference.dual import Matrix, Number, Vector, jacobian, values, variables
+from kfgen.reference.dual import Dual, Matrix, Number, Vector, hessian, jacobian, values, variables
 from kfgen.reference.linalg import check_covariance, symmetric
 from kfgen.reference.model import Context, Model
 from kfgen.reference.status import Status, StepError
@@ -26,6 +27,22 @@ class Transition:
     x: Vector
     F: Matrix
     Q: Matrix
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What noises do to a step, unjudged. added (n, n): to the covariance, by the additive noise and by all noise
+    inputs but the carried ones; carried (q, q): the covariance of these; given: the matrices of the spec that
+    went into both."""
+
+    added: Matrix
+    carried: Matrix
+    given: tuple[Matrix, ...]
+
+    def judge(self) -> None:
+        """Raises StepError NOT_POSITIVE where one of the spec's matrices is no covariance."""
+        for matrix in self.given:
+            check_covariance(matrix)
 
 
 class Process:
@@ -56,8 +73,8 @@ class Process:
                 if entry is not None and model.scope.constant(entry) != 0:
                     raise SpecError.at(entry.place, "a noise per step cannot be correlated with a density")
 
-    def linearise(self, x: Vector, context: Context) -> Transition:
-        """The step from x (n), with Jacobians and covariances at x.
+    def linearise(self, x: Vector, context: Context, additive: Matrix | None = None) -> Transition:
+        """The step from x (n), with Jacobians and covariances at x; additive: instead of the spec's own Q (n, n).
 
         Q = additive Q + G Qw G^T for the noises per step, G = d x_next / dw, + for densities G Qc G^T dt with
         G = df/dw at x, or, with the exact integrator, the integral of expm(A s) G Qc G^T expm(A s)^T over the
@@ -65,7 +82,7 @@ class Process:
         """
         model, n = self.model, self.model.n
         environment = model.environment(context, x)
-        Q, Qw = self._Q(environment), self._Qw(environment)
+        Q, Qw = self._Q(environment) if additive is None else additive, self._Qw(environment)
         held = np.ix_(self._held, self._held)
         if self._continuous and self._integrator == "exact":
             x_next, F, G = self._exact(x, np.zeros(len(self._held)), context)
@@ -86,13 +103,53 @@ class Process:
     def advance(self, x: Vector, w: Vector, context: Context) -> Vector:
         """The state a step after x (n), the noises per step at w (in the spec's order); may be NaN."""
         if self._continuous and self._integrator == "exact":
-            return self._exact(x, w, context)[0]
+            return self._advance_exact(x, w, context)
         return values(self._advance([float(v) for v in x], [float(v) for v in w], context))
 
     def expand(self, x: Vector, context: Context) -> Numbers:
         """The states after a step as second-order Duals in the joint variables (x, noises per step)."""
         joint = variables([*x, *np.zeros(len(self._held))], order=2)
+        if self._continuous and self._integrator == "exact":
+            return self._expand_exact(x, joint, context)
         return self._advance(joint[: self.model.n], joint[self.model.n :], context)
+
+    def jacobian(self, x: Vector, context: Context) -> Matrix:
+        """F (n, n) at x (n); may be NaN."""
+        still = np.zeros(len(self._held))
+        if self._continuous and self._integrator == "exact":
+            return self._exact(x, still, context)[1]
+        return jacobian(self._advance(variables(x), [float(v) for v in still], context), self.model.n)
+
+    def disturbance(self, x: Vector, context: Context, carried: Sequence[str]) -> Disturbance:
+        """The noises of a step from x (n), some of them carried by sigma points. Raises StepError NOT_FINITE.
+
+        No derivative by the states is taken: f may have none at x.
+        """
+        names = [self._names[i] for i in self._held]
+        own = [names.index(name) for name in carried]
+        rest = [i for i in range(len(names)) if i not in own]
+        environment = self.model.environment(context, x)
+        Q, Qw = self._Q(environment), self._Qw(environment)
+        held = Qw[np.ix_(self._held, self._held)]
+        added = Q
+        if rest:
+            w: Numbers = [0.0] * len(names)
+            for i, variable in zip(rest, variables(np.zeros(len(rest))), strict=True):
+                w[i] = variable
+            if self._continuous and self._integrator == "exact":
+                G = self._exact(x, np.zeros(len(names)), context)[2][:, rest]
+            else:
+                G = jacobian(self._advance([float(v) for v in x], w, context), len(rest))
+            added = added + G @ held[np.ix_(rest, rest)] @ G.T
+        if self._white:
+            added = added + self._diffusion(x, Qw[np.ix_(self._white, self._white)], context)
+        if not (np.all(np.isfinite(added)) and np.all(np.isfinite(Qw))):
+            raise StepError(Status.NOT_FINITE)
+        return Disturbance(symmetric(added), held[np.ix_(own, own)], (Q, Qw))
+
+    def held_covariance(self, x: Vector, context: Context) -> Matrix:
+        """The covariance of the noises per step, in the spec's order, at x (n)."""
+        return self._Qw(self.model.environment(context, x))[np.ix_(self._held, self._held)]
 
     def _rate(self, x: Sequence[Number], held: Sequence[Number], white: Sequence[Number], context: Context) -> Numbers:
         """The formulas of f at (x, noises): dx/dt in continuous form, else the next state."""
@@ -133,6 +190,30 @@ class Process:
         exponential = expm(_finite(generator * context.dt))
         F, G, d = exponential[:n, :n], exponential[:n, n : n + a], exponential[:n, -1]
         return F @ x + G @ w + d, F, G
+
+    def _advance_exact(self, x: Vector, w: Vector, context: Context) -> Vector:
+        """x after the step of dx/dt = A x + b(w) with w held: expm([[A, b], [0, 0]] dt) times (x, 1)."""
+        n, still = self.model.n, [0.0] * len(self._white)
+        rate = self._rate(variables(x), [float(v) for v in w], still, context)
+        A, generator = jacobian(rate, n), np.zeros((n + 1, n + 1))
+        generator[:n] = np.column_stack([A, values(rate) - A @ x])
+        if not np.all(np.isfinite(generator)):
+            return np.full(n, math.nan)
+        after: Vector = (expm(generator * context.dt) @ np.append(x, 1.0))[:n]
+        return after
+
+    def _expand_exact(self, x: Vector, joint: Numbers, context: Context) -> Numbers:
+        """The exact step bends only where a held noise enters dx/dt in a nonlinear way: by
+        (integral of expm(A s) over the step) times the second derivatives of dx/dt."""
+        n, k = self.model.n, len(joint)
+        x_next, F, G = self._exact(x, np.zeros(k - n), context)
+        A = self._rate_jacobians(x, context)[1]
+        generator = np.block([[A, np.eye(n)], [np.zeros((n, 2 * n))]])
+        integral = expm(_finite(generator * context.dt))[:n, n:]
+        rate = self._rate(joint[:n], joint[n:], [0.0] * len(self._white), context)
+        bends = np.array([hessian(number, k) for number in rate])
+        bends = np.einsum("ij,jkl->ikl", integral, bends)
+        return [Dual(float(x_next[i]), np.concatenate([F[i], G[i]]), bends[i]) for i in range(n)]
 
     def _diffusion(self, x: Vector, Qc: Matrix, context: Context) -> Matrix:
         """What the densities Qc add to the covariance over the step."""

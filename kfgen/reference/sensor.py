@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from kfgen.reference.dual import Matrix, Number, Vector, jacobian, value_of, values, variables
-from kfgen.reference.evaluate import Closure
+from kfgen.reference.evaluate import Closure, renamed
 from kfgen.reference.linalg import symmetric
 from kfgen.reference.model import PREDICTED, Context, Model, Z, wrap
 from kfgen.reference.status import Status, StepError
-from kfgen.spec.tree import Call, Expression, Name, Tree, names
+from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Sensor
+
+_HIDDEN = {"z": Z, "h": PREDICTED}
 
 
 @dataclass(frozen=True)
@@ -29,18 +31,20 @@ class Reading:
 @dataclass(frozen=True)
 class Linearisation:
     """Of the k components in use: h (k) the prediction, H (k, n) its Jacobian, R (k, k) the covariance of the
-    measurement noise, that of the noise inputs included."""
+    measurement noise, that of the noise inputs included; inputs (k, k): what those alone bring."""
 
     h: Vector
     H: Matrix
     R: Matrix
+    inputs: Matrix
 
 
 class SensorModel:
     """One sensor of a spec.
 
     Attributes: name; components: their names; m: how many; takes_inputs: whether h, R or what they use
-    contain inputs, so that an update needs u; partial: whether an update may be masked.
+    contain inputs, so that an update needs u; partial: whether an update may be masked; bent: for each
+    component, whether its differences are other than z - h.
     """
 
     def __init__(self, model: Model, sensor: Sensor) -> None:
@@ -54,11 +58,13 @@ class SensorModel:
         self._periods = [
             None if component.period is None else model.number(component.period) for component in sensor.components
         ]
+        residuals = [None if c.residual is None else renamed(c.residual.tree, _HIDDEN) for c in sensor.components]
         self._residuals: list[Closure | None] = [
-            None if c.residual is None else model.scope.compile(_private(c.residual.tree)) for c in sensor.components
+            None if residual is None else model.scope.compile(residual) for residual in residuals
         ]
         own = {c.name: c.variance for c in sensor.components if c.variance is not None}
         self._R = model.covariance(own if sensor.R is None else sensor.R, self.components)
+        self.bent = tuple(c.residual is not None or c.period is not None for c in sensor.components)
         self._noises = [noise.name for noise in sensor.noise]
         self._Re = model.noise_covariance(sensor.noise, sensor.noise_covariance)
         self.takes_inputs = bool(_reach(model, sensor) & set(model.inputs))
@@ -77,45 +83,71 @@ class SensorModel:
         joint = variables([*x, *np.zeros(k)])
         predicted = self.predict(joint[:n], joint[n:], reading.context, reading.used)
         derivatives = jacobian(predicted, n + k)
-        environment = self.model.environment(reading.context, x)
-        R, Re = self._R(environment, reading.used), self._Re(environment)
         h, H, M = values(predicted), derivatives[:, :n], derivatives[:, n:]
-        R = symmetric(R + M @ Re @ M.T)
+        inputs = M @ self.input_covariance(x, reading.context) @ M.T
+        R = symmetric(self.noise(x, reading.context, reading.used) + inputs)
         if not (np.all(np.isfinite(h)) and np.all(np.isfinite(H)) and np.all(np.isfinite(R))):
             raise StepError(Status.NOT_FINITE)
-        return Linearisation(h, H, R)
+        return Linearisation(h, H, R, symmetric(inputs))
+
+    def noise(self, x: Vector, context: Context, used: Sequence[int] | None = None) -> Matrix:
+        """R (k, k) of the components in use at x (n), without the noise inputs."""
+        return self._R(self.model.environment(context, x), used)
+
+    def input_covariance(self, x: Vector, context: Context) -> Matrix:
+        """The covariance of the sensor's noise inputs at x (n)."""
+        return self._Re(self.model.environment(context, x))
+
+    def jacobian(self, x: Vector, reading: Reading) -> Matrix:
+        """H (k, n) of the components in use at x (n); may be NaN."""
+        still = [0.0] * len(self._noises)
+        return jacobian(self.predict(variables(x), still, reading.context, reading.used), self.model.n)
+
+    def input_share(self, x: Vector, reading: Reading, inputs: Sequence[int]) -> Matrix:
+        """M Re M^T (k, k) at x (n) of some of the noise inputs alone."""
+        e: list[Number] = [0.0] * len(self._noises)
+        for i, variable in zip(inputs, variables(np.zeros(len(inputs))), strict=True):
+            e[i] = variable
+        predicted = self.predict([float(v) for v in x], e, reading.context, reading.used)
+        M = jacobian(predicted, len(inputs))
+        return symmetric(M @ self.input_covariance(x, reading.context)[np.ix_(inputs, inputs)] @ M.T)
+
+    def expand(self, x: Vector, reading: Reading) -> list[Number]:
+        """h of the components in use as second-order Duals in the joint variables (x, noise inputs)."""
+        joint = variables([*x, *np.zeros(len(self._noises))], order=2)
+        return self.predict(joint[: self.model.n], joint[self.model.n :], reading.context, reading.used)
+
+    def residual(self, x: Vector, reading: Reading) -> Vector:
+        """z - h(x) of the components in use, as `innovation` has it. Raises StepError NOT_FINITE."""
+        still = [0.0] * len(self._noises)
+        predicted = self.predict([float(v) for v in x], still, reading.context, reading.used)
+        return self.innovation(values(predicted), x, reading)
 
     def innovation(self, h: Vector, x: Vector, reading: Reading) -> Vector:
-        """z - h of the components in use, wrapped where periodic, or by the component's own residual.
+        """z - h of the components in use, as `difference` has it; h (k) is the prediction made at x (n)."""
+        return self.difference(reading.z[list(reading.used)], h, x, reading)
 
-        h (k) is the prediction made at x (n); an own residual may use x as h does.
-        Raises StepError NOT_FINITE.
+    def difference(self, z: Vector, h: Vector, x: Vector, reading: Reading) -> Vector:
+        """z - h (k) of the components in use, wrapped where periodic, or by the component's own residual.
+
+        An own residual may use x (n) as h does. Raises StepError NOT_FINITE.
         """
         environment = self.model.environment(reading.context, x)
         y = np.zeros(len(reading.used))
         for k, i in enumerate(reading.used):
-            z, predicted = float(reading.z[i]), float(h[k])
+            measured, predicted = float(z[k]), float(h[k])
             residual, period = self._residuals[i], self._periods[i]
             if residual is not None:
-                environment[self.model.scope.slots[Z]] = z
+                environment[self.model.scope.slots[Z]] = measured
                 environment[self.model.scope.slots[PREDICTED]] = predicted
                 y[k] = value_of(residual(environment))
             elif period is not None:
-                y[k] = wrap(z - predicted, period)
+                y[k] = wrap(measured - predicted, period)
             else:
-                y[k] = z - predicted
+                y[k] = measured - predicted
         if not np.all(np.isfinite(y)):
             raise StepError(Status.NOT_FINITE)
         return y
-
-
-def _private(tree: Tree) -> Tree:
-    """The tree of a residual with `z` and `h` as names that no state can have."""
-    if isinstance(tree, Name):
-        return {"z": Name(Z), "h": Name(PREDICTED)}.get(tree.name, tree)
-    if isinstance(tree, Call):
-        return replace(tree, args=tuple(_private(argument) for argument in tree.args))
-    return tree
 
 
 def _reach(model: Model, sensor: Sensor) -> set[str]:
@@ -129,7 +161,7 @@ def _reach(model: Model, sensor: Sensor) -> set[str]:
     definitions = {definition.name: definition.value for definition in model.spec.let}
     found: set[str] = set()
     trees = [formula.tree for formula in formulas if formula is not None]
-    trees += [_private(component.residual.tree) for component in sensor.components if component.residual is not None]
+    trees += [renamed(c.residual.tree, _HIDDEN) for c in sensor.components if c.residual is not None]
     pending = [name for tree in trees for name in names(tree)]
     while pending:
         name = pending.pop()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kfgen.spec.expressions import MAX_EXPONENT, MAX_LENGTH, MAX_NESTING, MAX_NODES
+from kfgen.spec.guide import GUIDE
 from kfgen.spec.names import MAX_NAME
 from kfgen.spec.reader import MAX_BYTES, MAX_DEPTH
 from kfgen.spec.schema import RECORDS
@@ -92,7 +93,9 @@ DECISIONS = (
     "The noises of sensors share the name space of all names, so two sensors have differently named "
     "noises.",
     "`robust: huber` stands for `{influence: huber, k: 1.345}`. `gain: steady` excludes robust, "
-    "adaptive, adapt_R, adapt_Q and partial, which make the gain vary; a gate is allowed.",
+    "adaptive, adapt_R, adapt_Q and partial, which make the gain vary, and limits of variances, which "
+    "are not kept; a gate is allowed. It assumes that each prediction is followed by one update of each "
+    "sensor, in order; get_covariance gives P after the last of them.",
     "adapt_R and adapt_Q lie strictly between 0 and 1; leave them out to switch them off. adapt_Q is "
     "there for kf, ekf and ekf2.",
     "Custom sigma points have one column per state, and so exclude `augment` with noises; wm sums to 1; "
@@ -116,6 +119,7 @@ def markdown() -> str:
     seen: list[Record] = []
     for record in RECORDS:
         _sections(record, parts, seen)
+    parts.append(GUIDE)
     parts.append("## What is decided where the language leaves a choice")
     parts.append("\n".join(f"* {decision}" for decision in DECISIONS))
     return "\n\n".join(parts) + "\n"

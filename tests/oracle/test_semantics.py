@@ -229,18 +229,6 @@ def test_problems_run_and_stay_consistent(name):
     ("text", "named"),
     [
         (IMM3, "imm"),
-        (CV4.replace("type: ekf", "type: ukf"), "ukf"),
-        (CV4.replace("type: ekf", "type: iekf, iterations: 2"), "iekf"),
-        (CV4.replace("type: ekf", "type: ekf2"), "ekf2"),
-        (CV4.replace("type: ekf", "type: ekf, covariance: sqrt"), "sqrt"),
-        (CV4.replace("type: ekf", "type: ekf, robust: chernodarov"), "robust"),
-        (CV4.replace("type: ekf", "type: ekf, adaptive: true"), "adaptive"),
-        (CV4.replace("type: ekf", "type: ekf, adapt_R: 1e-4"), "adapt_R"),
-        (CV4.replace("type: ekf", "type: ekf, adapt_Q: 1e-4"), "adapt_Q"),
-        (CV4.replace("type: ekf", "type: ekf, update: joseph, consider: [vx]"), "consider"),
-        (CV4.replace("type: ekf", "type: ekf, update: joseph, gain_limit: 0.9"), "gain_limit"),
-        (CV4.replace("type: ekf", "type: ekf, innovation_floor: 1e-8"), "innovation_floor"),
-        (CV4.replace("type: ekf", "type: kf, gain: steady"), "gain"),
     ],
 )
 def test_what_is_not_built_yet_says_so(text, named):

@@ -56,6 +56,10 @@ def _excluded(facts: Facts, chosen: Filter) -> None:
             if getattr(chosen, key) is not None:
                 text = f"`{key}` does not go with `gain: steady`: it makes the gain vary"
                 facts.add(_place(chosen, key), text, "remove one of the two")
+        for key in ("variance_floor", "variance_ceiling"):
+            if getattr(chosen, key):
+                text = f"`{key}` does not go with `gain: steady`: no covariance is kept"
+                facts.add(_place(chosen, key), text, "remove one of the two")
     points = chosen.sigma_points
     if points is not None and points.kind == "cubature" and chosen.reject is not None:
         text = "`reject` does not go with cubature: it has no centre point to replace others by"

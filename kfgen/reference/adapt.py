@@ -1,0 +1,79 @@
+"""Noise covariances that follow the innovations (adapt_R, adapt_Q): exponential forgetting.
+
+Mehra 1972; Akhlaghi, Zhou & Huang 2017.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kfgen.reference.dual import Matrix, Vector
+from kfgen.reference.linalg import symmetric
+from kfgen.reference.model import Context, Model
+from kfgen.reference.sensor import Reading, SensorModel
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """R: sensor -> (m, m), e: sensor -> (m) the residual after its last update; Q (n, n). Empty or None where
+    the spec does not adapt them. Without the covariances of noise inputs."""
+
+    R: Mapping[str, Matrix] = field(default_factory=dict)
+    e: Mapping[str, Vector] = field(default_factory=dict)
+    Q: Matrix | None = None
+
+
+NOTHING = Adapted()
+
+
+class Adaptation:
+    """The adaptation of a spec's R and Q. Attributes: R, Q: whether it adapts them."""
+
+    def __init__(self, model: Model) -> None:
+        options = model.spec.filter
+        self.model = model
+        self._a = 0.0 if options.adapt_R is None else model.number(options.adapt_R)
+        self._b = 0.0 if options.adapt_Q is None else model.number(options.adapt_Q)
+        self.R, self.Q = options.adapt_R is not None, options.adapt_Q is not None
+
+    def initial(self) -> Adapted:
+        """The spec's R and Q, which are constant, and no residuals."""
+        model, adapted = self.model, NOTHING
+        context = Context(model.values, np.zeros(len(model.inputs)), 0.0, 0.0)
+        if self.R:
+            sensors = [SensorModel(model, sensor) for sensor in model.spec.measurements]
+            R = {sensor.name: sensor.noise(model.x0, context) for sensor in sensors}
+            adapted = replace(adapted, R=R, e={sensor.name: np.zeros(sensor.m) for sensor in sensors})
+        if self.Q:
+            Q = model.covariance(model.spec.dynamics.Q, model.states)
+            adapted = replace(adapted, Q=symmetric(Q(model.environment(context, model.x0))))
+        return adapted
+
+    def noise(self, adapted: Adapted, reading: Reading, spread: Matrix) -> Matrix:
+        """R (m, m) for an update: (1 - a) R + a (spread + e e^T), spread (k, k) = H P H^T of the components
+        in use, e the residual after the sensor's last update.
+
+        Of what is not in use nothing is learnt; its correlations with the others are forgotten.
+        """
+        name, used = reading.sensor.name, list(reading.used)
+        R, e = adapted.R[name].copy(), adapted.e[name][used]
+        others = [i for i in range(len(R)) if i not in used]
+        R[np.ix_(used, used)] = (1.0 - self._a) * R[np.ix_(used, used)] + self._a * (spread + np.outer(e, e))
+        R[np.ix_(used, others)] *= 1.0 - self._a
+        R[np.ix_(others, used)] *= 1.0 - self._a
+        return symmetric(R)
+
+    def with_noise(self, adapted: Adapted, reading: Reading, R: Matrix, residual: Vector) -> Adapted:
+        """Keeps the R (m, m) of an update that was made, and its residual (k), z - h(x) at the x it stored."""
+        name = reading.sensor.name
+        e = adapted.e[name].copy()
+        e[list(reading.used)] = residual
+        return replace(adapted, R={**adapted.R, name: R}, e={**adapted.e, name: e})
+
+    def with_steps(self, adapted: Adapted, steps: Matrix) -> Adapted:
+        """Q <- (1 - b) Q + b sum of dx dx^T over the corrections (k, n) of an update's scalars."""
+        assert adapted.Q is not None
+        return replace(adapted, Q=symmetric((1.0 - self._b) * adapted.Q + self._b * steps.T @ steps))

@@ -1,0 +1,194 @@
+"""A reading against what a cloud of sigma points predicts of it: its innovation and all an update needs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kfgen.reference.adapt import Adaptation
+from kfgen.reference.algorithm import Estimate
+from kfgen.reference.carried import carried_by_sensor
+from kfgen.reference.cloud import Cloud, Drawing, average, centre, magnitude
+from kfgen.reference.dual import Matrix, Vector, values
+from kfgen.reference.joseph import PLAIN, Rules, Update, update
+from kfgen.reference.linalg import EPS, check_covariance, symmetric, udu
+from kfgen.reference.model import Model
+from kfgen.reference.sensor import Reading
+from kfgen.reference.sigma_points import upper_root
+from kfgen.reference.spread import Pivots, Spread, pivots, settled
+from kfgen.reference.status import Status, StepError
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """A reading as a cloud predicts it: its mean z (k), its spread, its covariances with the state, cross (n, k),
+    and with the carried noises, noise (q, k)."""
+
+    z: Vector
+    spread: Spread
+    cross: Matrix
+    noise: Matrix
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A reading against its prediction.
+
+    y (k): the innovation. R (k, k): the covariance of its noise, raised to the innovation floor. noise: the
+    adapted R (m, m) of the whole sensor that went into it, or None. S: the factors of the innovation
+    covariance. nis: y^T S^-1 y.
+    """
+
+    cloud: Cloud
+    predicted: Predicted
+    y: Vector
+    R: Matrix
+    noise: Matrix | None
+    S: Pivots
+    nis: float
+    flags: Status
+
+
+@dataclass(frozen=True)
+class Scalars:
+    """A reading whose components are processed one by one: y (k), H (k, n), R (k, k); noise: as in Measured;
+    plain: the update by which nis was judged."""
+
+    y: Vector
+    H: Matrix
+    R: Matrix
+    noise: Matrix | None
+    plain: Update
+
+
+class Measuring:
+    """The measurement side of a spec's sigma-point filter. plain: the rules by which nis is judged."""
+
+    def __init__(self, model: Model, drawing: Drawing, adaptation: Adaptation, plain: Rules = PLAIN) -> None:
+        self.drawing, self.adaptation, self.plain = drawing, adaptation, plain
+        self._carried: dict[str, tuple[int, ...]] = {}
+        for sensor in model.spec.measurements:
+            names = [noise.name for noise in sensor.noise]
+            # custom points have columns for the states only: all noise inputs stay M Re M^T
+            carried = () if drawing.rule.own else carried_by_sensor(model, sensor)
+            self._carried[sensor.name] = tuple(names.index(name) for name in carried)
+
+    def draw(self, x: Vector, P: Matrix, reading: Reading) -> Cloud:
+        """Points of x (n), P (n, n) and of the sensor's carried noises. Raises StepError NOT_FINITE."""
+        C = self._input_covariance(x, reading, self._carried[reading.sensor.name])
+        return self.drawing.draw(x, P, C)
+
+    def residual(self, x: Vector, P: Matrix, reading: Reading) -> Vector:
+        """The residual (k) of the reading against points drawn from x (n) and P (n, n). Raises NOT_FINITE."""
+        seen = self._predicted(x, reading, self.draw(x, P, reading))
+        return reading.sensor.innovation(seen.z, x, reading)
+
+    def whole(self, estimate: Estimate, reading: Reading, cloud: Cloud, noise: Matrix | None = None) -> Measured:
+        """The innovation and its covariance S = R + spread of the predicted readings.
+
+        noise (m, m): the adapted R, if it is known already. Raises StepError NOT_FINITE, NOT_POSITIVE.
+        """
+        seen = self._predicted(estimate.x, reading, cloud)
+        R, noise = self._noise(estimate, reading, cloud, seen, noise)
+        y = reading.sensor.innovation(seen.z, estimate.x, reading)
+        S, rounding = seen.spread.covariance + R, seen.spread.rounding
+        if not np.all(np.isfinite(S)):
+            raise StepError(Status.NOT_FINITE)
+        check_covariance(self._input_covariance(estimate.x, reading, self._within(cloud, reading)))
+        exact = bool(np.any(udu(R)[1] == 0.0))
+        S = settled(S, rounding)
+        lack = np.maximum(self.plain.floor - S.diagonal(), 0.0) if self.plain.floor > 0.0 else np.zeros(len(S))
+        flags = Status.REGULARIZED if np.any(lack) else Status.OK
+        S, R = S + np.diag(lack), R + np.diag(lack)
+        # without noise in some direction a pivot of S may be nothing but the rounding of the points
+        smallest = 8.0 * len(S) * EPS * S.diagonal() + (rounding.diagonal() if exact else 0.0)
+        factors = pivots(S, smallest)
+        nis = float(np.sum(factors.squares(y)))
+        if not math.isfinite(nis):
+            raise StepError(Status.NOT_FINITE)
+        return Measured(cloud, seen, y, R, noise, factors, nis, flags)
+
+    def scalars(self, estimate: Estimate, reading: Reading, cloud: Cloud) -> Scalars:
+        """The measurement matrix that regression on the points gives: H = Pxz^T P^-1; carried noises likewise.
+
+        It leaves out the covariance of the linearisation error (an approximation, and cheap).
+        Raises StepError NOT_FINITE, NOT_POSITIVE.
+        """
+        seen = self._predicted(estimate.x, reading, cloud)
+        R, noise = self._noise(estimate, reading, cloud, seen, None)
+        C = self._input_covariance(estimate.x, reading, self._within(cloud, reading))
+        H, M = regression(estimate.P, seen.cross), regression(C, seen.noise)
+        R = symmetric(R + M @ C @ M.T)
+        y = reading.sensor.innovation(seen.z, estimate.x, reading)
+        if not (np.all(np.isfinite(H)) and np.all(np.isfinite(R))):
+            raise StepError(Status.NOT_FINITE)
+        check_covariance(C)
+        plain = update(estimate.P, H, R, y, self.plain)
+        if not math.isfinite(plain.nis):
+            raise StepError(Status.NOT_FINITE)
+        return Scalars(y, H, R, noise, plain)
+
+    def _within(self, cloud: Cloud, reading: Reading) -> tuple[int, ...]:
+        """The noise inputs of the sensor of which a cloud holds values: kept points have none."""
+        return self._carried[reading.sensor.name] if cloud.noise.shape[1] else ()
+
+    def _input_covariance(self, x: Vector, reading: Reading, inputs: tuple[int, ...]) -> Matrix:
+        if not inputs:
+            return np.zeros((0, 0))
+        C = reading.sensor.input_covariance(x, reading.context)[np.ix_(inputs, inputs)]
+        if not np.all(np.isfinite(C)):
+            raise StepError(Status.NOT_FINITE)
+        return symmetric(C)
+
+    def _noise(
+        self, estimate: Estimate, reading: Reading, cloud: Cloud, seen: Predicted, noise: Matrix | None
+    ) -> tuple[Matrix, Matrix | None]:
+        """R (k, k) with M Re M^T of the noises that are not carried, and the adapted R (m, m) in it, if any."""
+        sensor, x, used = reading.sensor, estimate.x, reading.used
+        if self.adaptation.R and noise is None:
+            noise = self.adaptation.noise(estimate.adapted, reading, seen.spread.covariance)
+        R = sensor.noise(x, reading.context, used) if noise is None else noise[np.ix_(used, used)]
+        carried = self._within(cloud, reading)
+        rest = [i for i in range(len(sensor.spec.noise)) if i not in carried]
+        if rest:
+            R = R + sensor.input_share(x, reading, rest)
+        return symmetric(R), noise
+
+    def _predicted(self, x: Vector, reading: Reading, cloud: Cloud) -> Predicted:
+        """The reading that a cloud around x (n) predicts.
+
+        Periodic components, and those with a residual of their own, are averaged by their differences from the
+        image of the centre point; a set without one has h(x) evaluated beside, if there is such a component.
+        Raises StepError NOT_FINITE.
+        """
+        sensor, weights, carried = reading.sensor, cloud.weights, self._within(cloud, reading)
+
+        def image(point: Vector, e: Vector) -> Vector:
+            noise = np.zeros(len(sensor.spec.noise))
+            noise[list(carried)] = e
+            at = [float(v) for v in point]
+            return values(sensor.predict(at, [float(v) for v in noise], reading.context, reading.used))
+
+        images = np.array([image(point, e) for point, e in zip(cloud.points, cloud.noise, strict=True)])
+        if not np.all(np.isfinite(images)):
+            raise StepError(Status.NOT_FINITE)
+        bent = [sensor.bent[i] for i in reading.used]
+        base = centre(images, weights, bent, lambda: image(x, np.zeros(len(carried))))
+        differences = np.array([sensor.difference(z, base, x, reading) for z in images])
+        terms = magnitude(lambda point: sensor.jacobian(point, reading), cloud.points)
+        z, around = average(images, base, differences, weights, terms)
+        weighted = weights.wc[:, None] * around.deviations
+        return Predicted(z, around, cloud.deviations.T @ weighted, cloud.noise.T @ weighted)
+
+
+def regression(P: Matrix, cross: Matrix) -> Matrix:
+    """H (k, n) with H P = cross^T, cross (n, k): cross^T P^-1, with zero columns where P = U D U^T has zero pivots."""
+    root = upper_root(P)
+    D = root.diagonal() ** 2
+    U = np.eye(len(P))
+    U[:, D > 0.0] = root[:, D > 0.0] / np.sqrt(D[D > 0.0])
+    inverse = np.array([1.0 / d if d > 0.0 else 0.0 for d in D])
+    H: Matrix = np.linalg.solve(U.T, inverse[:, None] * np.linalg.solve(U, cross)).T
+    return H

@@ -1,0 +1,120 @@
+"""Sigma points: where they lie, in units of a root of the covariance, and what they weigh.
+
+Julier & Uhlmann 2004 (julier), van der Merwe 2004 (merwe), Wan & van der Merwe 2000 in the form of the
+unscented transform's encyclopaedia article (wiki), Arasaratnam & Haykin 2009 (cubature).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kfgen.reference.dual import Matrix, Vector
+from kfgen.reference.linalg import EPS
+from kfgen.reference.model import Model
+from kfgen.spec.tree import Expression
+
+
+@dataclass(frozen=True)
+class PointSet:
+    """N points in L dimensions of unit variance.
+
+    offsets (N, L): from the mean. wm (N), wc (N): their weights in means and covariances. centre: the row of
+    the point at the mean, None where the set has none. moment (L, L): the weighted covariance of the offsets.
+    """
+
+    offsets: Matrix
+    wm: Vector
+    wc: Vector
+    centre: int | None
+    moment: Matrix
+
+
+class SigmaRule:
+    """The rule of a spec for its sigma points; own: whether they are custom, and so of n dimensions only."""
+
+    def __init__(self, model: Model) -> None:
+        points = model.spec.filter.sigma_points
+        assert points is not None
+        self._kind = points.kind
+        self.own = points.kind == "custom"
+        self._alpha, self._beta, self._kappa = (
+            None if entry is None else model.number(entry) for entry in (points.alpha, points.beta, points.kappa)
+        )
+        self._sets: dict[int, PointSet] = {}
+        if self.own:
+            assert points.points is not None
+            assert points.wm is not None
+            assert points.wc is not None
+            offsets = np.array([_numbers(model, row) for row in points.points])
+            centres = np.flatnonzero(~np.any(offsets, axis=1))
+            centre = int(centres[0]) if len(centres) else None
+            wm, wc = _numbers(model, points.wm), _numbers(model, points.wc)
+            moment = (offsets * wc[:, None]).T @ offsets
+            # of weights written as decimals: what differs from the unit matrix by their rounding is meant to be it
+            unit = np.eye(model.n)
+            moment = np.where(np.abs(moment - unit) < 1e-12, unit, moment)
+            self._sets[model.n] = PointSet(offsets, wm, wc, centre, moment)
+
+    def points(self, dimensions: int) -> PointSet:
+        """The points in so many dimensions, L: x, then x + and x - the columns of sqrt(gamma) times the root."""
+        if dimensions not in self._sets:
+            self._sets[dimensions] = self._symmetric(dimensions)
+        return self._sets[dimensions]
+
+    def _symmetric(self, L: int) -> PointSet:
+        gamma, wm0, wc0, wm, wc = self._weights(L)
+        columns = np.sqrt(gamma) * np.eye(L)
+        if self._kind == "cubature":
+            return PointSet(np.vstack([columns, -columns]), np.full(2 * L, wm), np.full(2 * L, wc), None, np.eye(L))
+        offsets = np.vstack([np.zeros((1, L)), columns, -columns])
+        means, spreads = np.full(2 * L + 1, wm), np.full(2 * L + 1, wc)
+        means[0], spreads[0] = wm0, wc0
+        return PointSet(offsets, means, spreads, 0, np.eye(L))
+
+    def _weights(self, L: int) -> tuple[float, float, float, float, float]:
+        """gamma, the weights of the centre, those of the others."""
+        if self._kind == "trivial":
+            return L, 1.0 / (2.0 * L + 1.0), 0.5 / L, 1.0 / (2.0 * L + 1.0), 0.5 / L
+        if self._kind == "cubature":
+            return L, 0.0, 0.0, 0.5 / L, 0.5 / L
+        kappa = L if self._kappa is None else self._kappa
+        if self._kind == "julier":
+            gamma = L + kappa
+            return gamma, kappa / gamma, kappa / gamma, 0.5 / gamma, 0.5 / gamma
+        assert self._alpha is not None
+        assert self._beta is not None
+        # merwe: gamma = lambda + L with lambda = alpha^2 (L + kappa) - L
+        gamma = self._alpha**2 * (kappa if self._kind == "wiki" else L + kappa)
+        wm0 = (gamma - L) / gamma
+        return gamma, wm0, wm0 + 1.0 - self._alpha**2 + self._beta, 0.5 / gamma, 0.5 / gamma
+
+
+def _numbers(model: Model, row: tuple[Expression, ...]) -> Vector:
+    return np.array([model.number(entry) for entry in row])
+
+
+def upper_root(P: Matrix) -> Matrix:
+    """U sqrt(D) (n, n) of P = U D U^T, U unit upper triangular (Bierman 1977, section III.3).
+
+    A pivot of at most 8 n eps P_jj is 0, a direction without spread, and has a zero column. Definiteness is not
+    judged here: a negative pivot counts as 0.
+    """
+    n = len(P)
+    rest, root = P.copy(), np.zeros((n, n))
+    for j in range(n - 1, -1, -1):
+        pivot = rest[j, j]
+        if pivot > 8.0 * n * EPS * P[j, j]:
+            root[: j + 1, j] = rest[: j + 1, j] / np.sqrt(pivot)
+            rest[:j, :j] -= np.outer(rest[:j, j], rest[:j, j]) / pivot
+    return root
+
+
+def lower_root(P: Matrix) -> Matrix:
+    """The lower Cholesky factor (n, n) of P, with the same care."""
+    flip = slice(None, None, -1)
+    return upper_root(P[flip, flip])[flip, flip]
+
+
+ROOTS = {"ud": upper_root, "full": lower_root, "sqrt": lower_root}
