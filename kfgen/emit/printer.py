@@ -7,6 +7,7 @@ from collections.abc import Callable
 from kfgen.ir.nodes import Node, Table
 from kfgen.ir.program import (
     Assign,
+    Call,
     Declare,
     Flag,
     For,
@@ -14,6 +15,7 @@ from kfgen.ir.program import (
     If,
     Let,
     Section,
+    Slice,
     Statement,
     Store,
 )  # fmt: skip
@@ -63,6 +65,11 @@ class Printer:
                 return self._sum(node)
             case "real":
                 return f"({self.scalar.c_type}){e(node.args[0], _ATOM)}", _UNARY
+            case "lookup":
+                return f"{self.prefix}_{node.data.name}[{e(node.args[0])}]", _ATOM
+            case "bit":
+                path, place = node.data
+                return f"({self._path(path)} & 0x{1 << place:x}u) != 0u", _RELATION
             case "half":
                 return f"{e(node.args[0], _PRODUCT)} / 2", _PRODUCT
             case "slope":
@@ -89,9 +96,9 @@ class Printer:
                     return f"{b} {_COMPARE[node.op].replace('<', '>')} {a}", _RELATION
                 return f"{a} {_COMPARE[node.op]} {b}", _RELATION
             case "and":
-                return f"{e(node.args[0], _RELATION)} && {e(node.args[1], _RELATION)}", _AND
+                return f"{e(node.args[0], _AND)} && {e(node.args[1], _RELATION)}", _AND
             case "or":
-                return f"{e(node.args[0], _RELATION)} || {e(node.args[1], _RELATION)}", _OR
+                return f"{self._alternative(node.args[0])} || {self._alternative(node.args[1])}", _OR
             case "not":
                 return f"!{e(node.args[0], _ATOM)}", _UNARY
             case "select":
@@ -99,6 +106,10 @@ class Printer:
                 return f"{c} ? {a} : {b}", _TERNARY
             case _:
                 return self._call(node), _ATOM
+
+    def _alternative(self, node: Node) -> str:
+        """A side of ||: a chain of them as it is, && in parentheses for the reader's (and gcc's) sake."""
+        return self.expression(node) if node.op == "or" else self.expression(node, _RELATION)
 
     def _constant(self, node: Node) -> tuple[str, int]:
         if node.kind == "bool":
@@ -145,6 +156,14 @@ class Printer:
             return named if named is not None else str(int(index.constant))
         return self.expression(index)
 
+    def _argument(self, given: str | Slice | Node) -> str:
+        if isinstance(given, str):
+            return given
+        if isinstance(given, Node):
+            return self.expression(given)
+        path = self._path(given.array)
+        return path if given.offset.constant == 0 else f"&{path}[{self.expression(given.offset)}]"
+
     # statements --------------------------------------------------------------------------------------
 
     def statements(self, body: list[Statement], depth: int = 1) -> list[str]:
@@ -190,6 +209,9 @@ class Printer:
                 if len(body) == 1 and len(head) == 1 and not why and len(one_line) <= WIDTH:
                     return [one_line]
                 return head + body + ["    " * depth + "}"]
+            case Call(callee=callee, args=args):
+                given = [self._argument(a) for a in args]
+                return _wrapped(f"{self.prefix}_{callee.name}({', '.join(given)});", depth)
             case Flag(condition=condition, flag=flag):
                 return _wrapped(f"if ({e(condition)}) {{ flags |= {self.prefix.upper()}_{flag}; }}", depth)
             case For(variable=v, start=start, stop=stop, body=inner, down=down):

@@ -76,6 +76,7 @@ class FunctionView:
     opening: tuple[str, ...]
     body: tuple[str, ...]
     closing: str
+    private: bool
 
 
 @dataclass(frozen=True)
@@ -267,7 +268,7 @@ class _ViewMaker:
     # functions ---------------------------------------------------------------------------------------
 
     def index_name(self, path: str, index: int) -> str | None:
-        if path in ("kf.x", "x"):
+        if path in ("kf.x", "x") and index < len(self.spec.states):
             return f"{self.NAME}_{self.spec.states[index].name.upper()}"
         return None
 
@@ -277,12 +278,12 @@ class _ViewMaker:
         body = printer.statements(f.body)
         self.helpers |= printer.helpers
         void = f.returns == "void"
-        head = f"{'void' if void else self.name + '_status_t'} {self.name}_{f.name}("
+        head = f"{'static ' * f.private}{'void' if void else self.name + '_status_t'} {self.name}_{f.name}("
         arguments = [self.argument(a) for a in f.arguments]
         pointers = [a.name for a in f.arguments if a.pointer]
         test = " || ".join(f"{p} == NULL" for p in pointers)
         leave = "return;" if void else f"return {self.NAME}_NULL_ARGUMENT;"
-        opening = [f"if ({test}) {{ {leave} }}"]
+        opening = [] if f.private else [f"if ({test}) {{ {leave} }}"]
         if has_flags:
             opening.append(f"{self.name}_status_t flags = {self.NAME}_OK;")
         if body and body[0].lstrip().startswith("/*"):
@@ -310,6 +311,7 @@ class _ViewMaker:
             definition=tuple(prototype),
             opening=tuple(line.rstrip() for line in opening),
             body=tuple(body),
+            private=f.private,
             closing="" if void else "return flags;" if has_flags else f"return {self.NAME}_OK;",
         )
 
@@ -332,6 +334,10 @@ class _ViewMaker:
 
     def table_data(self) -> list[Data]:
         out = []
+        for lookup in self.code.lookups:
+            text = ", ".join(self.scalar.literal(v) for v in lookup.numbers)
+            lines = tuple(_fill(text, WIDTH - 6))
+            out.append(Data(name=f"{self.name}_{lookup.name}", size=len(lookup.numbers), lines=lines))
         for table, name in self.tables.items():
             for suffix, values in (("x", table.starts()), ("y", table.values()), ("slope", table.slopes())):
                 text = ", ".join(self.scalar.literal(v) for v in values)

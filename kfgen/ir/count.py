@@ -5,27 +5,44 @@ from __future__ import annotations
 from collections import Counter
 
 from kfgen.ir.nodes import Node
-from kfgen.ir.program import For, If, Statement, roots
+from kfgen.ir.program import Call, For, If, Statement, roots
 
-_FREE = {"const", "field", "element", "read", "variable", "counter", "real", "neg", "half", "finite"}
+_FREE = {"const", "field", "element", "read", "variable", "counter", "real", "neg", "half", "finite", "bit", "lookup"}
 _NAMES = {"lt": "compare", "le": "compare"}
 _SILENT = {"and", "or", "not"}
 
 
 def operations(body: list[Statement]) -> dict[str, int] | None:
-    """Operation -> how often one call executes it, in a fixed order; None where loops make it depend on the run.
+    """Operation -> how often one call executes it, in a fixed order; None where that depends on the run.
 
     A sum of k terms is k - 1 add; its products are mul.
     """
     counts: Counter[str] = Counter()
-    for statement in body:
-        if isinstance(statement, For | If):
-            return None
-        for root in roots(statement):
-            _count(root, counts)
+    if not _tally(body, 1, counts):
+        return None
     first = ["mul", "add", "div", "sqrt"]
     order = first + sorted(k for k in counts if k not in first)
     return {op: counts[op] for op in order if counts[op]}
+
+
+def _tally(body: list[Statement], times: int, counts: Counter[str]) -> bool:
+    """Add what `times` executions of the statements take; False where a loop has no fixed length."""
+    for statement in body:
+        if isinstance(statement, If):
+            return False
+        if isinstance(statement, For):
+            start, stop = statement.start.constant, statement.stop.constant
+            if start is None or stop is None or not _tally(statement.body, times * int(stop - start), counts):
+                return False
+            continue
+        if isinstance(statement, Call) and not _tally(statement.callee.body, times, counts):
+            return False
+        once: Counter[str] = Counter()
+        for root in roots(statement):
+            _count(root, once)
+        for op, count in once.items():
+            counts[op] += count * times
+    return True
 
 
 def _count(node: Node, counts: Counter[str]) -> None:

@@ -10,7 +10,21 @@ from fractions import Fraction
 from typing import Any
 
 from kfgen.ir.nodes import Node
-from kfgen.ir.program import Assign, Declare, Flag, For, Function, Guard, If, Let, Section, Statement, Store
+from kfgen.ir.program import (
+    Assign,
+    Call,
+    Declare,
+    Flag,
+    For,
+    Function,
+    Guard,
+    If,
+    Let,
+    Section,
+    Slice,
+    Statement,
+    Store,
+)  # fmt: skip
 from kfgen.scalars.base import Scalar
 
 
@@ -73,11 +87,31 @@ class _Machine:
             case Flag(condition=condition, flag=flag):
                 if self.value(condition):
                     self.flags.add(flag)
+            case Call():
+                self.call(statement)
             case For():
                 self.loop(statement)
             case If(condition=condition, body=body):
                 if self.value(condition):
                     self.block(body)
+
+    def call(self, call: Call) -> None:
+        memory = Memory(dict(self.memory.arrays), dict(self.memory.numbers))
+        parts: list[tuple[str, list[Any], int]] = []
+        for argument, given in zip(call.callee.arguments, call.args, strict=True):
+            if isinstance(given, Slice):
+                whole = self.locals[given.array] if given.array in self.locals else self.memory.arrays[given.array]
+                start = self.value(given.offset)
+                assert argument.size is not None
+                memory.arrays[argument.name] = whole[start : start + argument.size]
+                if not argument.constant:
+                    parts.append((argument.name, whole, start))
+            elif isinstance(given, Node):
+                memory.numbers[argument.name] = self.value(given)
+        _Machine(self.scalar, memory).block(call.callee.body)
+        for name, whole, start in parts:
+            result = memory.arrays[name]
+            whole[start : start + len(result)] = result
 
     def loop(self, statement: For) -> None:
         start, stop = self.value(statement.start), self.value(statement.stop)
@@ -108,6 +142,11 @@ class _Machine:
                 return found[self.value(node.args[0])] if node.args else found
             case "real":
                 return self.scalar.convert(self.value(node.args[0]))
+            case "lookup":
+                return self.scalar.convert(node.data.numbers[self.value(node.args[0])])
+            case "bit":
+                path, place = node.data
+                return bool(self.memory.numbers[path] >> place & 1)
             case "half":
                 return self.value(node.args[0]) // 2
             case "select":  # as C's ?: only the chosen branch is evaluated

@@ -42,6 +42,14 @@ class Table:
         return (Fraction(0), *inner, Fraction(0))
 
 
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """A table of numbers, looked up by a counter."""
+
+    numbers: tuple[Fraction, ...]
+    name: str
+
+
 class Node:
     """One operation. `data` holds what is not a node: a constant, a reference, a table, the signs of a sum.
 

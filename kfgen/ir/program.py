@@ -91,7 +91,23 @@ class If:
     body: list[Statement]
 
 
-Statement = Section | Let | Declare | Assign | Store | Guard | Flag | For | If
+@dataclass(slots=True)
+class Slice:
+    """A part of an array, from offset on, handed to a function."""
+
+    array: str
+    offset: Node
+
+
+@dataclass(slots=True)
+class Call:
+    """A private function of the filter is run. args: `kf` and `u` by name, parts of arrays, numbers."""
+
+    callee: Function
+    args: list[str | Slice | Node]
+
+
+Statement = Call | Section | Let | Declare | Assign | Store | Guard | Flag | For | If
 
 
 @dataclass(slots=True)
@@ -115,6 +131,7 @@ class Function:
     body: list[Statement]
     doc: str
     returns: str = "status"  # status | void
+    private: bool = False  # static in the C, called by others
     notes: list[str] = field(default_factory=list)
 
 
@@ -133,6 +150,9 @@ def roots(statement: Statement) -> list[Node]:
             return [condition]
         case For(start=start, stop=stop):
             return [start, stop]
+        case Call(args=args):
+            slices = [a.offset for a in args if isinstance(a, Slice)]
+            return slices + [a for a in args if isinstance(a, Node)]
         case Section():
             return []
 

@@ -14,6 +14,7 @@ from fractions import Fraction
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import (
     Assign,
+    Call,
     Declare,
     Flag,
     For,
@@ -21,6 +22,7 @@ from kfgen.ir.program import (
     If,
     Let,
     Section,
+    Slice,
     Statement,
     Store,
     roots,
@@ -56,6 +58,8 @@ class _Scheduler:
         self.kept: set[Node] = set()
 
     def run(self) -> list[Statement]:
+        for block in (self.trace.block, *self.trace.blocks.values()):
+            self.taken |= {item.name for item in block.items if isinstance(item, Declare)}
         self._count(self.trace.block)
         return self._block(self.trace.block)
 
@@ -186,8 +190,12 @@ class _Scheduler:
                 reads = list(item.args)
             else:
                 reads = roots(item)
+            met: set[int] = set()
             while reads and stored:
                 node = reads.pop()
+                if node.serial in met:
+                    continue
+                met.add(node.serial)
                 if node in self.kept or (self._shared(node) and node.op not in ("field", "element")):
                     continue
                 if (node.op == "element" and (node.data, node.args[0].constant) in stored) or (
@@ -208,14 +216,18 @@ class _Scheduler:
                 position[item] = epoch
                 continue
             stack = [n for n in roots(item) if n.volatile]
+            met: set[int] = set()
             while stack:
                 node = stack.pop()
+                if node.serial in met:
+                    continue
+                met.add(node.serial)
                 if node in position and position[node] != epoch and node.kind != "int":
                     forced.add(node)
                     self._local(node)
                     continue
                 stack.extend(a for a in node.args if a.volatile)
-            if isinstance(item, Assign | For | If):
+            if isinstance(item, Assign | Call | For | If):
                 epoch += 1
         return forced
 
@@ -229,6 +241,10 @@ class _Scheduler:
             case Guard():
                 before = [replace(s, node=op(s.node)) for s in item.before]
                 return replace(item, condition=op(item.condition), before=before)
+            case Call(args=args):
+                given = [replace(a, offset=op(a.offset)) if isinstance(a, Slice) else op(a) if isinstance(a, Node)
+                         else a for a in args]  # fmt: skip
+                return replace(item, args=given)
             case Flag():
                 return replace(item, condition=op(item.condition))
             case For():

@@ -11,8 +11,21 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from kfgen.ir.nodes import BOOL, INT, REAL, Node, Pool, Table
-from kfgen.ir.program import Assign, Declare, Flag, For, Guard, If, Section, Statement, Store
+from kfgen.ir.nodes import BOOL, INT, REAL, Constants, Node, Pool, Table
+from kfgen.ir.program import (
+    Assign,
+    Call,
+    Declare,
+    Flag,
+    For,
+    Function,
+    Guard,
+    If,
+    Section,
+    Slice,
+    Statement,
+    Store,
+)  # fmt: skip
 
 Number = int | Fraction
 
@@ -102,6 +115,8 @@ class Trace:
         self.pool = _RecordingPool(self)
         self.block = Block()
         self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body
+        self.raised: list[tuple[Value, str]] = []  # conditions of warnings, and which
+        self.depth = 0  # of loops and branches
         self.names: dict[Node, str] = {}
         self.doubts: list[tuple[Value, str]] = []  # conditions under which an assumption made fails, and why
         self.signs: dict[Node, int] = {}  # what is known of the sign of values (see filters.numbers)
@@ -148,6 +163,14 @@ class Trace:
             return self.wrapped(self.pool.boolean(True))
         return self.wrapped(self.pool.make("finite", (a.node,), kind=BOOL))
 
+    def constants(self, values: tuple[Fraction, ...], index: Value, name: str) -> Value:
+        """An entry of a table of constants."""
+        return self.wrapped(self.pool.make("lookup", (index.node,), Constants(values, name)))
+
+    def bit(self, path: str, place: int) -> Value:
+        """Whether a bit of an integer argument is set."""
+        return self.wrapped(self.pool.make("bit", (), (path, place), BOOL))
+
     def name(self, value: Value, name: str) -> Value:
         """Keep a value under a name of the model; constants and what has a name keep theirs."""
         if value.node.op not in ("const", "field") and value.node not in self.names:
@@ -171,7 +194,18 @@ class Trace:
     def flag(self, condition: Value, flag: str) -> None:
         """Warn with this flag where the condition holds."""
         if condition.constant != 0:
+            self.raised.append((condition, flag))
             self.block.items.append(Flag(condition.node, flag))
+
+    def call(self, callee: Function, args: list[str | tuple[str, int | Value] | Value]) -> None:
+        """Run a private function: `kf` or `u` by name, (array, offset), numbers."""
+        given: list[str | Slice | Node] = []
+        for a in args:
+            if isinstance(a, tuple):
+                given.append(Slice(a[0], self.node(a[1], INT)))
+            else:
+                given.append(a if isinstance(a, str) else a.node)
+        self.block.items.append(Call(callee, given))
 
     def array(self, name: str, size: int) -> Array:
         """A local array, not initialised."""
@@ -203,7 +237,9 @@ class Trace:
         outer, self.block = self.block, Block()
         self.blocks[id(statement)] = self.block
         mark = self.pool.mark()
+        self.depth += 1
         yield
+        self.depth -= 1
         self.pool.forget(mark)  # what was made inside is not in scope outside
         self.block = outer
 
