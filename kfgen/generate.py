@@ -56,6 +56,7 @@ def build(spec: Spec, scalar: str | None = None) -> Generated:
     notes = [code.description]
     if code.order != tuple(range(len(code.order))):
         notes.append("inner order: " + " ".join(code.model.states[i] for i in code.order))
+    notes += code.remarks
     return Generated(render(view), Summary(rows, view.ram, notes), code, view)
 
 

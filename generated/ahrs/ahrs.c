@@ -757,7 +757,7 @@ ahrs_status_t ahrs_update_accel(ahrs_t *kf, const ahrs_accel_t *z)
 
     /* guards */
     if (!ahrs_finite(y_x + y_y + y_z + s_x + s_y + s_z)) { return AHRS_NOT_FINITE; }
-    if ((!(s_x > 0.0f) || !(s_y > 0.0f)) || !(s_z > 0.0f)) { return AHRS_NOT_POSITIVE; }
+    if (!(s_x > 0.0f) || !(s_y > 0.0f) || !(s_z > 0.0f)) { return AHRS_NOT_POSITIVE; }
 
     /* gate */
     const bool t208 = nis > 16.266235f;
@@ -1109,7 +1109,7 @@ ahrs_status_t ahrs_update_mag(ahrs_t *kf, const ahrs_mag_t *z)
 
     /* guards */
     if (!ahrs_finite(y_x + y_y + y_z + s_x + s_y + s_z)) { return AHRS_NOT_FINITE; }
-    if ((!(s_x > 0.0f) || !(s_y > 0.0f)) || !(s_z > 0.0f)) { return AHRS_NOT_POSITIVE; }
+    if (!(s_x > 0.0f) || !(s_y > 0.0f) || !(s_z > 0.0f)) { return AHRS_NOT_POSITIVE; }
 
     /* gate */
     const bool t218 = nis > 16.266235f;
@@ -1243,9 +1243,9 @@ void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[49])
             for (int k = j + 1; k < 7; k++) {
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
-            const float p_1 = sum;
-            P[7 * i + j] = p_1;
-            P[7 * j + i] = p_1;
+            const float value = sum;
+            P[7 * i + j] = value;
+            P[7 * j + i] = value;
         }
     }
 }

@@ -255,9 +255,9 @@ void battery_get_covariance(const battery_t *kf, battery_real_t P[9])
             for (int k = j + 1; k < 3; k++) {
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
-            const float p_1 = sum;
-            P[3 * i + j] = p_1;
-            P[3 * j + i] = p_1;
+            const float value = sum;
+            P[3 * i + j] = value;
+            P[3 * j + i] = value;
         }
     }
 }

@@ -302,9 +302,9 @@ void cv2d_get_covariance(const cv2d_t *kf, cv2d_real_t P[16])
             for (int k = j + 1; k < 4; k++) {
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
-            const float p_1 = sum;
-            P[4 * cv2d_order[i] + cv2d_order[j]] = p_1;
-            P[4 * cv2d_order[j] + cv2d_order[i]] = p_1;
+            const float value = sum;
+            P[4 * cv2d_order[i] + cv2d_order[j]] = value;
+            P[4 * cv2d_order[j] + cv2d_order[i]] = value;
         }
     }
 }

@@ -266,9 +266,9 @@ void cv4_get_covariance(const cv4_t *kf, cv4_real_t P[16])
             for (int k = j + 1; k < 4; k++) {
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
-            const float p_1 = sum;
-            P[4 * cv4_order[i] + cv4_order[j]] = p_1;
-            P[4 * cv4_order[j] + cv4_order[i]] = p_1;
+            const float value = sum;
+            P[4 * cv4_order[i] + cv4_order[j]] = value;
+            P[4 * cv4_order[j] + cv4_order[i]] = value;
         }
     }
 }

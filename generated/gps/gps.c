@@ -342,7 +342,7 @@ gps_status_t gps_update_range(gps_t *kf, const gps_range_t *z, const gps_inputs_
     if (!gps_finite(x_next + y_next + z_next + clock_next + drift_next + nis)) {
         return GPS_NOT_FINITE;
     }
-    if (((!(s_r1 > 0.0) || !(s_r2 > 0.0)) || !(s_r3 > 0.0)) || !(s_r4 > 0.0)) {
+    if (!(s_r1 > 0.0) || !(s_r2 > 0.0) || !(s_r3 > 0.0) || !(s_r4 > 0.0)) {
         return GPS_NOT_POSITIVE;
     }
 
@@ -448,9 +448,9 @@ void gps_get_covariance(const gps_t *kf, gps_real_t P[25])
             for (int k = j + 1; k < 5; k++) {
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
-            const double p_1 = sum;
-            P[5 * gps_order[i] + gps_order[j]] = p_1;
-            P[5 * gps_order[j] + gps_order[i]] = p_1;
+            const double value = sum;
+            P[5 * gps_order[i] + gps_order[j]] = value;
+            P[5 * gps_order[j] + gps_order[i]] = value;
         }
     }
 }

@@ -120,9 +120,9 @@ void scalar_get_covariance(const scalar_t *kf, scalar_real_t P[1])
     if (kf == NULL || P == NULL) { return; }
     for (int j = 0; j < 1; j++) {
         for (int i = 0; i < j + 1; i++) {
-            const float p_1 = kf->D[j];
-            P[i + j] = p_1;
-            P[i + j] = p_1;
+            const float value = kf->D[j];
+            P[i + j] = value;
+            P[i + j] = value;
         }
     }
 }

@@ -79,10 +79,10 @@ vehicle_status_t vehicle_predict(vehicle_t *kf, const vehicle_inputs_t *u, vehic
     const float t7 = t6 * cos_heading;
     const float sin_heading = sinf(t5);
     const float t8 = t6 * sin_heading;
+    const float f_y_heading = t7 * step;
     const float t9 = t8 * step;
     const float f_x_gyro_bias = t8 * t4 * step;
     const float f_x_speed = cos_heading * step;
-    const float f_y_heading = t7 * step;
     const float x_next = kf->x[VEHICLE_X] + f_y_heading;
     const float t10 = t7 * t4 * step;
     const float f_y_speed = sin_heading * step;
@@ -525,9 +525,9 @@ void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25])
             for (int k = j + 1; k < 5; k++) {
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
-            const float p_1 = sum;
-            P[5 * vehicle_order[i] + vehicle_order[j]] = p_1;
-            P[5 * vehicle_order[j] + vehicle_order[i]] = p_1;
+            const float value = sum;
+            P[5 * vehicle_order[i] + vehicle_order[j]] = value;
+            P[5 * vehicle_order[j] + vehicle_order[i]] = value;
         }
     }
 }

@@ -294,9 +294,9 @@ void vehicle_tutorial_get_covariance(const vehicle_tutorial_t *kf, vehicle_tutor
             for (int k = j + 1; k < 4; k++) {
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
-            const float p_1 = sum;
-            P[4 * vehicle_tutorial_order[i] + vehicle_tutorial_order[j]] = p_1;
-            P[4 * vehicle_tutorial_order[j] + vehicle_tutorial_order[i]] = p_1;
+            const float value = sum;
+            P[4 * vehicle_tutorial_order[i] + vehicle_tutorial_order[j]] = value;
+            P[4 * vehicle_tutorial_order[j] + vehicle_tutorial_order[i]] = value;
         }
     }
 }

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from kfgen.ir.nodes import Table
+from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import Argument, Function
 from kfgen.model import Model
 
@@ -34,11 +34,14 @@ class FilterCode:
     notes: tuple[str, ...] = ()
     constants: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  # static const tables of indices
     tables: Mapping[Table, str] = field(default_factory=dict)
+    lookups: tuple[Constants, ...] = ()
+    remarks: tuple[str, ...] = ()  # for the build's table
 
 
 KF = Argument("kf", "{name}_t", pointer=True, constant=False, doc="filter")
 CONST_KF = Argument("kf", "{name}_t", pointer=True, doc="filter")
 INPUTS = Argument("u", "{name}_inputs_t", pointer=True)
+MASK = Argument("mask", "uint32_t", pointer=False, doc="bit i: use component i")
 DT = Argument("dt", "{name}_real_t", pointer=False, doc="time step [s]")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -12,18 +13,28 @@ from kfgen.filters import process
 from kfgen.filters.base import FilterCode
 from kfgen.filters.ekf import Ekf
 from kfgen.filters.full import Full
-from kfgen.filters.layout import Layout
-from kfgen.filters.numbers import is_zero
+from kfgen.filters.iterated import Iekf
+from kfgen.filters.layout import GainChange, Layout
+from kfgen.filters.linalg import Vector
+from kfgen.filters.numbers import is_zero, select
 from kfgen.filters.order import best_order
-from kfgen.filters.sensor import linearise
+from kfgen.filters.second import Ekf2
+from kfgen.filters.sensor import SensorCode
+from kfgen.filters.sqrt import Sqrt
+from kfgen.filters.steady import Steady
 from kfgen.filters.ud import UD
+from kfgen.filters.ukf import Ukf
 from kfgen.filters.unbuilt import unbuilt
-from kfgen.ir.nodes import Table
+from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import roots, walk
 from kfgen.ir.trace import Trace
 from kfgen.model import Model, build_model
 from kfgen.scalars import Scalar
 from kfgen.spec.types import Spec
+
+_FILTERS: dict[str, Callable[[Model, Layout, Scalar], Any]] = {
+    "kf": Ekf, "ekf": Ekf, "iekf": Iekf, "ekf2": Ekf2, "ukf": Ukf,
+}  # fmt: skip
 
 
 def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
@@ -36,14 +47,40 @@ def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCod
         raise SpecError(missing)
     model = build_model(spec)
     _check_measurements(model)
-    n = len(model.states)
-    update = spec.filter.update
-    assert update is not None
-    best = _order(model)
-    layout: Layout = UD(n, update) if spec.filter.covariance == "ud" else Full(n, update, scalar.epsilon, best)
-    order = best if layout.reorders else list(range(n))
-    code = Ekf(model, layout, order, scalar).code(taken)
-    return _with_tables(code)
+    if spec.filter.gain is not None:
+        return _with_tables(Steady(model, scalar).code(taken))
+    return _with_tables(_FILTERS[spec.filter.type](model, _layout(model, scalar), scalar).code(taken))
+
+
+def _layout(model: Model, scalar: Scalar) -> Layout:
+    """How the covariance is kept, and in which order of the states."""
+    n, chosen = len(model.states), model.spec.filter
+    if chosen.covariance == "sqrt":
+        return Sqrt(n)
+    if chosen.type == "ukf":  # sigma points depend on the order
+        straight = list(range(n))
+        return UD(straight, "bierman") if chosen.covariance == "ud" else Full(n, "standard", scalar.epsilon, straight)
+    assert chosen.update is not None
+    order = _order(model)
+    if chosen.covariance == "ud":
+        return UD(order, chosen.update, _gain_change(model, order))
+    return Full(n, chosen.update, scalar.epsilon, order, _gain_change(model, list(range(n))))
+
+
+def _gain_change(model: Model, order: list[int]) -> GainChange | None:
+    """What `consider` and `gain_limit` make of a gain in the filter's inner order."""
+    options = model.options
+    if options.gain_limit is None and not options.consider:
+        return None
+
+    def change(K: Vector) -> Vector:
+        K = [0 if i in options.consider else k for i, k in zip(order, K, strict=True)]
+        limit = options.gain_limit
+        if limit is None:
+            return K
+        return [k if is_zero(k) else select(k > limit, limit, select(k < -limit, -limit, k)) for k in K]
+
+    return change
 
 
 def _check_measurements(model: Model) -> None:
@@ -70,7 +107,8 @@ def linearise_rows(t: Trace, model: Model, sensor: Any) -> list[list[Any]]:
     plain = replace(
         sensor, R=((sympy.S.Zero,) * m,) * m, noise_covariance=((sympy.S.Zero,) * q,) * q, residual=(None,) * m,
     )  # fmt: skip
-    return linearise(t, model, plain).rows
+    code = SensorCode(t, model, plain, list(range(len(model.states))))
+    return code.linearise(code.prior()).H
 
 
 def _order(model: Model) -> list[int]:
@@ -93,6 +131,7 @@ def _order(model: Model) -> list[int]:
 def _with_tables(code: FilterCode) -> FilterCode:
     """Number the tables that the functions use, in the order of their first use."""
     found: dict[Table, str] = {}
+    lookups: dict[Constants, None] = {}
     for function in code.functions:
         for statement in walk(function.body):
             stack = list(reversed(roots(statement)))
@@ -100,5 +139,7 @@ def _with_tables(code: FilterCode) -> FilterCode:
                 node = stack.pop()
                 if isinstance(node.data, Table):
                     found.setdefault(node.data, f"table{len(found)}")
+                if isinstance(node.data, Constants):
+                    lookups[node.data] = None
                 stack += reversed(node.args)
-    return replace(code, tables=found)
+    return replace(code, tables=found, lookups=tuple(lookups))

@@ -6,9 +6,14 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.base import Block
-from kfgen.filters.linalg import Rows, Symmetric, Vector
-from kfgen.filters.numbers import is_positive, is_zero, require_nonnegative, select, sqrt
+from kfgen.filters.gather import cholesky
+from kfgen.filters.layout import GainChange
+from kfgen.filters.linalg import Measurement, Rows, Vector
+from kfgen.filters.noise import Additive
+from kfgen.filters.numbers import Number, is_positive, is_zero, select, sqrt
+from kfgen.filters.symmetric import Symmetric, assembled
 from kfgen.filters.ud import column
+from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 
 
@@ -22,11 +27,16 @@ class Full:
 
     title = "full"
     reorders = False
+    factored = False
     group = 1
 
-    def __init__(self, n: int, update: str, epsilon: Fraction, sequence: list[int]) -> None:
+    def __init__(
+        self, n: int, update: str, epsilon: Fraction, sequence: list[int], change: GainChange | None = None
+    ) -> None:
         self.n = n
+        self.order = list(range(n))
         self.form = update
+        self.change = change
         self.epsilon = epsilon
         # After a prediction the columns are computed and stored in an order that keeps together what the model
         # couples: few entries of the old P are then still needed when they are overwritten.
@@ -39,18 +49,14 @@ class Full:
     def load(self, t: Trace) -> Symmetric:
         return Symmetric(self.n, lambda i, j: t.element("kf.P", packed(i, j)))
 
-    def predict(self, t: Trace, P: Symmetric, F: Rows, Q: Rows, noise: list[tuple[Vector, Value]]) -> Symmetric:
+    def predict(self, t: Trace, P: Symmetric, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Symmetric:
         """F P F^T + Q + sum of d w w^T over the noise columns (w, d)."""
-        entries = [q for row in Q for q in row]
-        if any(q.constant is None for q in entries):  # a constant Q was tested with the spec
-            diagonal = all(is_zero(Q[i][j]) for i in range(self.n) for j in range(self.n) if i != j)
-            for q in [Q[i][i] for i in range(self.n)] if diagonal else linalg.udu(Q)[1]:
-                require_nonnegative(q, "a noise variance is negative")
+        additive = Q.entries()
         t.section("P = F P F^T + Q: the diagonal first, for the guards")
 
         def with_noise(i: int, j: int, p: Value) -> Value:
-            if not is_zero(Q[i][j]):
-                p = p + Q[i][j]
+            if not is_zero(additive[i][j]):
+                p = p + additive[i][j]
             for w, d in noise:
                 if not is_zero(w[i]) and not is_zero(w[j]):
                     p = p + w[i] * d * w[j]
@@ -58,26 +64,41 @@ class Full:
 
         return P.congruent(F).changed(with_noise)
 
-    def update(self, t: Trace, P: Symmetric, rows: Rows, variances: Vector) -> tuple[Symmetric, Rows, Vector]:
+    def update(self, t: Trace, P: Symmetric, measurements: list[Measurement]) -> tuple[Symmetric, Rows, Vector]:
         """Scalar measurements one after another: P, the gains (m, n) and the innovation variances (m,)."""
         gains, s = [], []
-        for h, r in zip(rows, variances, strict=True):
+        for measurement in measurements:
+            h, r = measurement.h, measurement.r
             c = P.times(h)
-            variance = linalg.dot(h, c) + r
+            variance = linalg.times(measurement.g, linalg.dot(h, c)) + r
             K = linalg.quotients(c, variance, r)
-            P = P.joseph(h, r, c, K) if self.form == "joseph" else P.downdated(h, r, c, K)
+            if self.change is not None:
+                K = self.change(K)
+            if self.form == "joseph":
+                P = P.joseph(measurement, c, K, changed=self.change is not None)
+            else:
+                P = P.downdated(measurement, c, K)
             if not is_positive(r):
-                P = self._clamped(t, P, K, c)
+                P = self._clamped(t, P, measurement, K, c)
             gains.append(K)
             s.append(variance)
         return P, gains, s
 
-    def _clamped(self, t: Trace, P: Symmetric, K: Vector, c: Vector) -> Symmetric:
+    def entries(self, P: Symmetric) -> Symmetric:
+        return P
+
+    def variance(self, P: Symmetric, h: Vector) -> Number:
+        return linalg.dot(h, P.times(h))
+
+    def inflated(self, P: Symmetric, a: Number) -> Symmetric:
+        return P.changed(lambda i, j, p: linalg.times(p, a))
+
+    def _clamped(self, t: Trace, P: Symmetric, measurement: Measurement, K: Vector, c: Vector) -> Symmetric:
         """A variance that an exact measurement took to zero may come out below it by round-off: back to zero."""
         low = {}
         for i in range(self.n):
             if not is_zero(K[i]):
-                old = P[i, i] + K[i] * c[i]
+                old = P[i, i] + linalg.times(measurement.g, K[i]) * c[i]
                 low[i] = (P[i, i] < 0) & (P[i, i] >= -(old * (4 * self.n * self.epsilon)))
                 t.flag(low[i], "REGULARIZED")
         return P.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p)
@@ -123,6 +144,31 @@ class Full:
             for i in self.sequence[: last + 1] if after_predict else range(j + 1):
                 low, high = min(i, j), max(i, j)
                 t.store("kf.P", packed(low, high), t.name(P[low, high], f"p_{names[low]}_{names[high]}"))
+
+    def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
+        return assembled(U, D)
+
+    def root(self, P: Symmetric, tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
+        S, failures = cholesky(lambda i, j: P[i, j], self.n, tolerance)
+        return [[S[i][j] for i in range(self.n)] for j in range(self.n)], failures
+
+    def downdated(
+        self, t: Trace, P: Symmetric, c: Vector, s: Number, tolerance: Fraction, sure: bool
+    ) -> tuple[Symmetric, Value]:
+        inverse = 1 / s
+        K = [linalg.times(x, inverse) for x in c]
+        after = P.changed(lambda i, j, p: linalg.minus(p, linalg.times(K[i], c[j])))
+        if sure:
+            return after, t.wrapped(t.pool.boolean(False))
+        low = {i: after[i, i] < 0 for i in range(self.n) if not is_zero(c[i])}
+        failed: Value = t.wrapped(t.pool.boolean(False))
+        for i, negative in low.items():
+            failed = failed | (after[i, i] < -(P[i, i] * tolerance))
+            t.flag(negative, "REGULARIZED")
+        return after.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p), failed
+
+    def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
+        return []
 
     # covariance in and out, as loops -------------------------------------------------------------------
 

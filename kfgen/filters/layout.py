@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, Protocol
 
 from kfgen.filters.base import Block
-from kfgen.filters.linalg import Rows, Vector
+from kfgen.filters.linalg import Measurement, Rows, Vector
+from kfgen.filters.noise import Additive
+from kfgen.filters.numbers import Number
+from kfgen.filters.symmetric import Symmetric
+from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 
 Covariance = Any  # the layout's own: factors, entries, ...
+GainChange = Callable[[Vector], Vector]  # what consider and gain_limit make of a gain
 
 
 class Layout(Protocol):
@@ -17,7 +23,10 @@ class Layout(Protocol):
 
     n: int
     title: str  # "U D U^T"
-    reorders: bool  # whether the inner order of the states is the generator's to choose
+    order: list[int]  # inner position -> state of the spec
+    reorders: bool  # whether that order is the generator's choice, for the header to tell
+    change: GainChange | None  # joseph only: the other forms need the gain that they make
+    factored: bool  # whether an adapted Q or R is kept as its factors
     group: int  # scalar measurements that are best updated together
 
     def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
@@ -28,12 +37,27 @@ class Layout(Protocol):
         """The covariance as it stands in the struct."""
         ...
 
-    def predict(self, t: Trace, P: Covariance, F: Rows, Q: Rows, noise: list[tuple[Vector, Value]]) -> Covariance:
-        """F P F^T + Q + sum of d w w^T over the noise columns (w, d). F, Q: (n, n)."""
+    def predict(self, t: Trace, P: Covariance, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Covariance:
+        """F P F^T + Q + sum of d w w^T over the noise columns (w, d). F: (n, n)."""
         ...
 
-    def update(self, t: Trace, P: Covariance, rows: Rows, variances: Vector) -> tuple[Covariance, Rows, Vector]:
-        """Scalar measurements one after another: P, the gains (m, n), the innovation variances (m,)."""
+    def update(self, t: Trace, P: Covariance, measurements: list[Measurement]) -> tuple[Covariance, Rows, Vector]:
+        """Scalar measurements one after another: P, the gains (m, n), the innovation variances (m,).
+
+        The P that is given stays as it is.
+        """
+        ...
+
+    def entries(self, P: Covariance) -> Symmetric:
+        """P as a dense matrix; what is not asked for is not computed."""
+        ...
+
+    def variance(self, P: Covariance, h: Vector) -> Number:
+        """h P h^T."""
+        ...
+
+    def inflated(self, P: Covariance, a: Number) -> Covariance:
+        """a P."""
         ...
 
     def tolerance(self, P: Covariance, h: Vector) -> Value | int:
@@ -52,6 +76,30 @@ class Layout(Protocol):
 
     def store(self, t: Trace, P: Covariance, names: list[str], after_predict: bool) -> None:
         """Into the struct. names: of the states, for the locals."""
+        ...
+
+    def root(self, P: Covariance, tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
+        """The columns of a root of P, each (n,), and conditions under which P is indefinite.
+
+        A pivot up to `tolerance` of its diagonal is a direction without spread.
+        """
+        ...
+
+    def from_factors(self, t: Trace, U: Rows, D: Vector) -> Covariance:
+        """U D U^T (layouts that are factored)."""
+        ...
+
+    def downdated(
+        self, t: Trace, P: Covariance, c: Vector, s: Number, tolerance: Fraction, sure: bool
+    ) -> tuple[Covariance, Value]:
+        """P - c c^T / s, s > 0, and the condition under which that is indefinite beyond `tolerance`, relative.
+
+        sure: it cannot be, but for rounding that leaves variances positive.
+        """
+        ...
+
+    def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
+        """Further functions of the filter that this layout offers. outdated: as in CovarianceCode."""
         ...
 
     def get(self, t: Trace, i: Value, j: Value) -> Value:

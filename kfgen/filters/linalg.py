@@ -6,7 +6,7 @@ are looked at. Every function is exact in real arithmetic; what is structurally 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 
 from kfgen.filters.numbers import (
     Number,
@@ -23,6 +23,18 @@ from kfgen.filters.numbers import (
 
 Vector = list[Number]
 Rows = list[list[Number]]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A scalar measurement: its row h (n,), its variance r, and its weight g, 1 but for robust updates.
+
+    An update with it makes s = r + g h P h^T, K = P h^T / s, P - g K s K^T.
+    """
+
+    h: Vector
+    r: Number
+    g: Number = 1
 
 
 def plus(a: Number, b: Number) -> Number:
@@ -124,16 +136,16 @@ def _element(u: Number, w: Number, s: Number, b: Number, t: Number, own: bool) -
     return u + b * left, left
 
 
-def bierman(U: Rows, D: Vector, rows: Rows, variances: Vector) -> tuple[Rows, Vector]:
+def bierman(U: Rows, D: Vector, measurements: list[Measurement]) -> tuple[Rows, Vector]:
     """Scalar measurement updates one after another, in place (Bierman 1977, V.2).
 
-    Normalised, so that k ends as the gain: U_ij -= f_j k_i, k_i += b U_ij, k_j = b. The measurements take one
-    column of U after another together. rows: h (m, n), variances: (m,). Returns the gains (m, n) and the
-    s = h P h^T + r (m,). A zero s gives a zero gain and changes nothing.
+    Normalised, so that k ends as the gain: U_ij -= g f_j k_i, k_i += b U_ij, k_j = b. The measurements take one
+    column of U after another together. Returns the gains (m, n) and the s (m,). A zero s gives a zero gain and
+    changes nothing.
     """
     n = len(D)
-    K = [[0] * n for _ in rows]
-    s = list(variances)
+    K = [[0] * n for _ in measurements]
+    s = [measurement.r for measurement in measurements]
     for j in range(n):
         column = [U[i][j] for i in range(j)]
         steps: list[tuple[Vector, Number, Number]] = []
@@ -145,12 +157,14 @@ def bierman(U: Rows, D: Vector, rows: Rows, variances: Vector) -> tuple[Rows, Ve
                 u = u if is_zero(k[i]) else u - f * k[i]
             return u
 
-        for c, h in enumerate(rows):
+        for c, measurement in enumerate(measurements):
+            h = measurement.h
             f = dot([element(i) if not is_zero(h[i]) else 0 for i in range(j)] + [1], h[: j + 1])
             if is_zero(f) or is_zero(D[j]):
                 continue
-            b, D[j], s[c] = _gain(D[j], f, s[c])
-            steps.append((K[c], f, b))
+            weighted = times(measurement.g, f)
+            b, D[j], s[c] = _gain(D[j], f, weighted, s[c])
+            steps.append((K[c], weighted, b))
         for i in reversed(range(j)):
             u = column[i]
             for k, f, b in steps:
@@ -164,10 +178,44 @@ def bierman(U: Rows, D: Vector, rows: Rows, variances: Vector) -> tuple[Rows, Ve
     return K, s
 
 
-def _gain(D: Number, f: Number, before: Number) -> tuple[Number, Number, Number]:
-    """b, the new D and s of one column: s = before + f^2 D, b = D f / s, D' = D before / s."""
+def downdate(U: Rows, D: Vector, c: Vector, s: Number, tolerance: Number) -> tuple[Number, Number]:
+    """U D U^T -= c c^T / s, s > 0, in place: Bierman's update for an h with P h^T = c and r = s - h P h^T.
+
+    Returns the condition of failure, that the result is not positive semidefinite, and whether r was nothing but
+    rounding (up to `tolerance` of s) and was taken as 0.
+    """
+    n = len(D)
+    v: Vector = list(c)  # U^-1 c = D f
+    for j in reversed(range(n)):
+        for i in range(j):
+            v[i] = minus(v[i], times(U[i][j], v[j]))
+    f = [times(x, 1 / d if is_positive(d) else reciprocal(d)[1]) for x, d in zip(v, D, strict=True)]
+    r = s - dot(f, v)
+    limit = s * tolerance
+    failed = ~(r >= -limit)
+    gone = r <= limit
+    before = assume_nonnegative(select(gone, 0, r))
+    k: Vector = [0] * n
+    for j in range(n):
+        if is_zero(v[j]):
+            continue
+        after = before + f[j] * v[j]
+        some, inverse = reciprocal(assume_nonnegative(after))
+        b = times(v[j], inverse)
+        for i in range(j):
+            old = U[i][j]
+            U[i][j] = minus(old, times(f[j], k[i]))
+            k[i] = plus(k[i], times(b, U[i][j]))
+        k[j] = b
+        D[j] = assume_nonnegative(D[j] * select(some, before * inverse, 1))
+        before = after
+    return failed, gone
+
+
+def _gain(D: Number, f: Number, weighted: Number, before: Number) -> tuple[Number, Number, Number]:
+    """b, the new D and s of one column: s = before + g f^2 D, b = D f / s, D' = D before / s. weighted: g f."""
     v = D if is_one(f) else D * f
-    s = before + f * v
+    s = before + weighted * v
     if is_positive(before):
         assume_positive(s)
         inverse = 1 / s
@@ -222,93 +270,29 @@ def udu(P: Rows) -> tuple[Rows, Vector]:
     return U, D
 
 
+def udu_computed(P: Rows, smallest: Number) -> tuple[Rows, Vector]:
+    """The same of a matrix that is positive semidefinite but for rounding: pivots are at least smallest P_jj."""
+    n = len(P)
+    P = [list(row) for row in P]
+    U = zeros(n, n)
+    D: Vector = [0] * n
+    scale = [P[j][j] for j in range(n)]
+    for j in reversed(range(n)):
+        if is_zero(scale[j]):
+            continue
+        least = scale[j] * smallest
+        D[j] = assume_nonnegative(P[j][j] if j == n - 1 else select(P[j][j] > least, P[j][j], least))
+        inverse = 1 / D[j] if is_positive(D[j]) else reciprocal(D[j])[1]
+        for i in range(j):
+            U[i][j] = times(P[i][j], inverse)
+        for i in range(j):
+            for k in range(i + 1):
+                if not is_zero(U[i][j]) and not is_zero(P[k][j]):
+                    P[k][i] = P[k][i] - U[i][j] * P[k][j]
+    return U, D
+
+
 def quotients(c: Vector, s: Number, r: Number) -> Vector:
     """c / s, and 0 where s is 0, for s = r + something not negative."""
     inverse = 1 / s if is_positive(r) else reciprocal(s)[1]
     return [times(x, inverse) for x in c]
-
-
-class Symmetric:
-    """A symmetric matrix whose entries are made when they are first asked for.
-
-    What is asked for first is computed first: gains and guards before the bulk, each entry just before its store.
-    """
-
-    def __init__(self, n: int, entry: Callable[[int, int], Number]) -> None:
-        self.n = n
-        self._entry = entry
-        self._made: dict[tuple[int, int], Number] = {}
-
-    def __getitem__(self, ij: tuple[int, int]) -> Number:
-        key = (min(ij), max(ij))
-        if key not in self._made:
-            self._made[key] = self._entry(*key)
-        return self._made[key]
-
-    def times(self, h: Vector) -> Vector:
-        """P h^T."""
-        return [self.dot(i, h) for i in range(self.n)]
-
-    def dot(self, i: int, h: Vector) -> Number:
-        """Row i times h."""
-        return dot([0 if is_zero(hj) else self[i, j] for j, hj in enumerate(h)], h)
-
-    def downdated(self, h: Vector, r: Number, c: Vector, K: Vector) -> Symmetric:
-        """P - K s K^T after a measurement h of variance r. c: P h^T = s K.
-
-        Where h measures a single state, its row is h P' = r K^T: cheaper, and without the difference of nearly
-        equal numbers.
-        """
-        seen = [j for j, x in enumerate(h) if not is_zero(x)]
-        single = seen[0] if len(seen) == 1 else -1
-
-        def entry(i: int, j: int) -> Number:
-            if is_zero(K[i]) or is_zero(c[j]):
-                return self[i, j]
-            if single in (i, j):
-                k = K[j if i == single else i]
-                return r * k if is_one(h[single]) else r / h[single] * k
-            return self[i, j] - K[i] * c[j]
-
-        return Symmetric(self.n, entry)
-
-    def joseph(self, h: Vector, r: Number, c: Vector, K: Vector) -> Symmetric:
-        """(I - K h) P (I - K h)^T + r K K^T for any gain: A = (I - K h) P, then A - (A h^T - r K) K^T.
-
-        c: P h^T.
-        """
-
-        def partial(i: int, j: int) -> Number:
-            return self[i, j] if is_zero(K[i]) or is_zero(c[j]) else self[i, j] - K[i] * c[j]
-
-        rest: Vector = []
-        for i, k in enumerate(K):
-            a = dot([0 if is_zero(hj) else partial(i, j) for j, hj in enumerate(h)], h)
-            rest.append(a if is_zero(k) else k * r if is_zero(a) else k * r - a)
-
-        def entry(i: int, j: int) -> Number:
-            a = partial(i, j)
-            return a if is_zero(rest[i]) or is_zero(K[j]) else a + rest[i] * K[j]
-
-        return Symmetric(self.n, entry)
-
-    def congruent(self, F: Rows) -> Symmetric:
-        """F P F^T. The sparser of two rows is the outer factor."""
-        weight = [sum(not is_zero(x) for x in row) for row in F]
-        made: dict[tuple[int, int], Number] = {}
-
-        def product(i: int, k: int) -> Number:
-            """(F P)_ik."""
-            if (i, k) not in made:
-                made[i, k] = self.dot(k, F[i])
-            return made[i, k]
-
-        def entry(i: int, j: int) -> Number:
-            outer, inner = (i, j) if weight[i] <= weight[j] else (j, i)
-            return dot([0 if is_zero(x) else product(inner, k) for k, x in enumerate(F[outer])], F[outer])
-
-        return Symmetric(len(F), entry)
-
-    def changed(self, change: Callable[[int, int, Number], Number]) -> Symmetric:
-        """Every entry through a function."""
-        return Symmetric(self.n, lambda i, j: change(i, j, self[i, j]))

@@ -22,6 +22,11 @@ def is_zero(a: Number) -> bool:
     return bool(a.constant == 0) if isinstance(a, Value) else bool(a == 0)
 
 
+def is_constant(a: Number) -> bool:
+    """Known, and the same in every run."""
+    return a.constant is not None if isinstance(a, Value) else True
+
+
 def is_one(a: Number) -> bool:
     return bool(a.constant == 1) if isinstance(a, Value) else bool(a == 1)
 
@@ -51,6 +56,13 @@ def sqrt(a: Number) -> Number:
     return math.sqrt(a)
 
 
+def constant_root(value: Fraction) -> Fraction:
+    """The square root of a constant, to 60 digits."""
+    root = Trace().function("sqrt", value).constant
+    assert root is not None
+    return root
+
+
 def is_positive(a: Number) -> bool:
     """Known to be above zero whatever the run brings."""
     return _sign(a.trace, a.node) == 2 if isinstance(a, Value) else bool(a > 0)
@@ -70,7 +82,8 @@ def assume_positive(a: Number) -> Number:
 
 def assume_nonnegative(a: Number) -> Number:
     if isinstance(a, Value) and a.constant is None:
-        _facts(a.trace).setdefault(a.node, 1)
+        facts = _facts(a.trace)
+        facts[a.node] = max(1, facts.get(a.node, 0))
     return a
 
 

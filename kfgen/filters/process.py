@@ -34,12 +34,17 @@ class Prior:
 
 @dataclass(frozen=True)
 class Advance:
-    """x (n), F (n, n), Q (n, n) and the noise columns (w, d): P <- F P F^T + Q + sum d w w^T. Spec's order."""
+    """x (n), F (n, n), Q (n, n) and the noise columns (w, d): P <- F P F^T + Q + sum d w w^T. Spec's order.
+
+    after: x with its derivatives. added: what of Q comes from noise densities.
+    """
 
     x: list[Value]
     F: Rows
     Q: Rows
     noise: list[tuple[Vector, Value]]
+    after: list[Dual]
+    added: Rows | None = None
 
 
 def step_length(t: Trace, model: Model) -> Step:
@@ -99,11 +104,18 @@ def given(t: Trace, model: Model, step: Step) -> Prior:
     return Prior(x, duals)
 
 
-def advance(t: Trace, model: Model, prior: Prior, step: Step) -> Advance:
-    """One step of the model from the prior."""
+def advance(
+    t: Trace, model: Model, prior: Prior, step: Step, additive: Rows | None = None, derivatives: int = 1,
+    carried: tuple[str, ...] = (),
+) -> Advance:
+    """One step of the model from the prior. additive: what stands for the Q of the spec (n, n).
+
+    derivatives: 2 has `after` carry second derivatives too. carried: noise inputs that are accounted for otherwise.
+    """
     n = len(model.states)
-    at_prior = Evaluator(t, model, prior.duals)
-    Q = [[at_prior.value(e) for e in row] for row in model.Q]
+    at_prior = Evaluator(t, model, prior.duals, derivatives)
+    Q = [[at_prior.value(e) for e in row] for row in model.Q] if additive is None else additive
+    added: Rows | None = None
     held = [w.name for w in model.noises if not w.density]
     dense = [w.name for w in model.noises if w.density]
     extra: list[tuple[Vector, Value]] = []
@@ -119,13 +131,27 @@ def advance(t: Trace, model: Model, prior: Prior, step: Step) -> Advance:
             added, extra = linear.noise(t, at_prior, [[Qw[i][j] for j in index] for i in index], step.dt)
             Q = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(Q, added, strict=True)]
         else:
-            after = _integrate(t, model, prior, step.dt, held)
+            after = _integrate(t, model, prior, step.dt, held, derivatives)
             rates = [at_prior(e) for e in model.f]
             extra = _columns(t, model, rates, dense, Qw, step.dt)
     F = [[d.gradient.get(name, t.zero) for name in model.states] for d in after]
-    noise = _columns(t, model, after, held, Qw, None) + extra
+    noise = _columns(t, model, after, [w for w in held if w not in carried], Qw, None) + extra
     assert len(F) == n
-    return Advance([d.value for d in after], F, Q, noise)
+    return Advance([d.value for d in after], F, Q, noise, after, added)
+
+
+def moved(t: Trace, model: Model, duals: dict[str, Dual], dt: Value | None) -> list[Value]:
+    """x after a step from given values of all that f uses, noise inputs included."""
+    prior = Prior([duals[name].value for name in model.states], duals)
+    if model.spec.dynamics.form == "discrete":
+        evaluator = Evaluator(t, model, duals)
+        return [evaluator.value(e) for e in model.f]
+    assert dt is not None
+    if model.spec.dynamics.integrator == "exact":
+        after = discretise(model).advance(t, Evaluator(t, model, duals), duals, dt)
+    else:
+        after = _integrate(t, model, prior, dt, [w.name for w in model.noises if not w.density], 1)
+    return [d.value for d in after]
 
 
 def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Rows, dt: Value | None
@@ -158,7 +184,9 @@ def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Ro
     return columns
 
 
-def _integrate(t: Trace, model: Model, prior: Prior, dt: Value, held: list[str]) -> list[Dual]:
+def _integrate(
+    t: Trace, model: Model, prior: Prior, dt: Value, held: list[str], derivatives: int
+) -> list[Dual]:
     """euler, midpoint or rk4 with substeps; t, dt, inputs and noises are held over the step.
 
     Derivatives are carried through the stages, so F and G are those of the integrator itself.
@@ -172,7 +200,7 @@ def _integrate(t: Trace, model: Model, prior: Prior, dt: Value, held: list[str])
     moving = [i for i, e in enumerate(model.f) if e != 0]
 
     def rate(x: list[Dual]) -> list[Dual]:
-        evaluator = Evaluator(t, model, {**constant, **dict(zip(model.states, x, strict=True))})
+        evaluator = Evaluator(t, model, {**constant, **dict(zip(model.states, x, strict=True))}, derivatives)
         return [evaluator(e) for e in model.f]
 
     def shifted(x: list[Dual], k: list[Dual], length: Value) -> list[Dual]:

@@ -6,8 +6,13 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.base import Block
-from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.numbers import assume_nonnegative, is_one, is_zero, require_nonnegative, select
+from kfgen.filters.gather import columns_of, root_of_factors
+from kfgen.filters.layout import GainChange
+from kfgen.filters.linalg import Measurement, Rows, Vector
+from kfgen.filters.noise import NEGATIVE, Additive
+from kfgen.filters.numbers import Number, assume_nonnegative, is_one, is_zero, require_nonnegative, select
+from kfgen.filters.symmetric import Symmetric, assembled
+from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 
 
@@ -21,10 +26,13 @@ class UD:
 
     title = "U D U^T"
     reorders = True
+    factored = True
 
-    def __init__(self, n: int, update: str) -> None:
-        self.n = n
+    def __init__(self, order: list[int], update: str, change: GainChange | None = None) -> None:
+        self.order = order
+        self.n = n = len(order)
         self.form = update
+        self.change = change
         # Elements of U are fetched once for a group of columns; the columns have to stay in registers.
         self.group = max(2, 40 // n)
 
@@ -45,14 +53,14 @@ class UD:
         D = [assume_nonnegative(t.element("kf.D", j)) for j in range(n)]
         return U, D
 
-    def predict(self, t: Trace, P: tuple[Rows, Vector], F: Rows, Q: Rows, noise: list[tuple[Vector, Value]]
+    def predict(self, t: Trace, P: tuple[Rows, Vector], F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]
                 ) -> tuple[Rows, Vector]:  # fmt: skip
         """P <- F P F^T + Q + sum of d w w^T over the noise columns (w, d)."""
         U, D = P
         n = self.n
-        UQ, DQ = self._factored_noise(t, Q)
+        UQ, DQ = Q.factors()
         for _, d in noise:
-            require_nonnegative(d, "a noise variance is negative")
+            require_nonnegative(d, NEGATIVE)
         identity = all(is_zero(F[i][j]) and is_one(F[i][i]) for i in range(n) for j in range(n) if i != j)
         upper = all(is_zero(F[i][j]) for i in range(n) for j in range(i)) and all(is_one(F[i][i]) for i in range(n))
         if upper:
@@ -77,49 +85,57 @@ class UD:
             t.section(what + ("" if len(columns) <= self.group else f", columns {k} to {k + len(part) - 1}"))
             linalg.rank_one(U, D, part)
 
-    def _factored_noise(self, t: Trace, Q: Rows) -> tuple[Rows, Vector]:
-        n = self.n
-        if all(is_zero(Q[i][j]) for i in range(n) for j in range(i + 1, n)):
-            U: Rows = [[t.zero] * n for _ in range(n)]
-            D = [Q[i][i] for i in range(n)]
-        else:
-            U, D = linalg.udu(Q)
-        for d in D:
-            require_nonnegative(d, "a noise variance is negative")
-        return U, D
-
-    def update(self, t: Trace, P: tuple[Rows, Vector], rows: Rows, variances: Vector
+    def update(self, t: Trace, P: tuple[Rows, Vector], measurements: list[Measurement]
                ) -> tuple[tuple[Rows, Vector], Rows, Vector]:  # fmt: skip
         """Scalar measurements one after another: P, the gains (m, n) and the innovation variances (m,)."""
-        U, D = P
+        U, D = [list(row) for row in P[0]], list(P[1])
         if self.form == "joseph":
             gains, s = [], []
-            for h, r in zip(rows, variances, strict=True):
-                K, variance = self._joseph(U, D, h, r)
+            for measurement in measurements:
+                K, variance = self._joseph(U, D, measurement)
                 gains.append(K)
                 s.append(variance)
-            return P, gains, s
-        gains, s = linalg.bierman(U, D, rows, variances)
-        return P, gains, s
+        else:
+            gains, s = linalg.bierman(U, D, measurements)
+        return (U, D), gains, s
 
-    def _joseph(self, U: Rows, D: Vector, h: Vector, r: Value) -> tuple[Vector, Value]:
-        """(I - K h) P (I - K h)^T + r K K^T by weighted Gram-Schmidt of [(K h - I) U | K], weights [D, r]."""
+    def _joseph(self, U: Rows, D: Vector, measurement: Measurement) -> tuple[Vector, Value]:
+        """(I - g K h) P (I - g K h)^T + g r K K^T by weighted Gram-Schmidt of [(g K h - I) U | K], weights [D, g r]."""
         n = self.n
-        f = [linalg.dot([U[i][j] for i in range(j)] + [1], h[: j + 1]) for j in range(n)]
-        v = [fj if is_zero(fj) else d * fj for d, fj in zip(D, f, strict=True)]
-        s = r + linalg.dot(f, v)
+        r, g = measurement.r, measurement.g
+        f, v = self._projected(U, D, measurement.h)
+        s = r + linalg.times(g, linalg.dot(f, v))
         c = [linalg.dot([1] + [U[i][j] for j in range(i + 1, n)], v[i:]) for i in range(n)]
         K = linalg.quotients(c, s, r)
+        if self.change is not None:
+            K = self.change(K)
+        weighted = [linalg.times(g, k) for k in K]
         rows = [
-            [K[i] * f[j] - (U[i][j] if j > i else 1 if j == i else 0) if not is_zero(K[i]) and not is_zero(f[j])
+            [weighted[i] * f[j] - (U[i][j] if j > i else 1 if j == i else 0)
+             if not is_zero(K[i]) and not is_zero(f[j])
              else -(U[i][j]) if j > i else -1 if j == i else 0 for j in range(n)] + [K[i]]
             for i in range(n)
         ]  # fmt: skip
-        U1, D1 = linalg.gram_schmidt(rows, [*D, r])
+        U1, D1 = linalg.gram_schmidt(rows, [*D, linalg.times(g, r)])
         for i in range(n):
             D[i] = D1[i]
             U[i][:] = U1[i]
         return K, s
+
+    def _projected(self, U: Rows, D: Vector, h: Vector) -> tuple[Vector, Vector]:
+        """f = U^T h^T and v = D f."""
+        f = [linalg.dot([U[i][j] for i in range(j)] + [1], h[: j + 1]) for j in range(self.n)]
+        return f, [fj if is_zero(fj) else d * fj for d, fj in zip(D, f, strict=True)]
+
+    def entries(self, P: tuple[Rows, Vector]) -> Symmetric:
+        return assembled(*P)
+
+    def variance(self, P: tuple[Rows, Vector], h: Vector) -> Number:
+        return linalg.dot(*self._projected(*P, h))
+
+    def inflated(self, P: tuple[Rows, Vector], a: Number) -> tuple[Rows, Vector]:
+        U, D = P
+        return U, [linalg.times(d, a) for d in D]
 
     def tolerance(self, P: tuple[Rows, Vector], h: Vector) -> Value | int:
         """None: a sum of D_j f_j^2 is not negative."""
@@ -153,6 +169,22 @@ class UD:
                 t.store("kf.U", packed(i, j), t.name(U[i][j], f"u_{names[i]}_{names[j]}"))
         for j in range(self.n):
             t.store("kf.D", j, t.name(D[j], f"d_{names[j]}"))
+
+    def from_factors(self, t: Trace, U: Rows, D: Vector) -> tuple[Rows, Vector]:
+        return U, D
+
+    def root(self, P: tuple[Rows, Vector], tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
+        return columns_of(root_of_factors(*P)), []
+
+    def downdated(self, t: Trace, P: tuple[Rows, Vector], c: Vector, s: Number, tolerance: Fraction, sure: bool
+                  ) -> tuple[tuple[Rows, Vector], Value]:  # fmt: skip
+        U, D = [list(row) for row in P[0]], list(P[1])
+        failed, gone = linalg.downdate(U, D, c, s, tolerance)
+        t.flag(gone, "REGULARIZED")
+        return (U, D), failed
+
+    def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
+        return []
 
     # covariance in and out, as loops -------------------------------------------------------------------
 

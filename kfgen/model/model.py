@@ -12,6 +12,7 @@ import sympy
 from kfgen.errors import KfgenError, Mistake, Place, SpecError
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
+from kfgen.model.options import INNOVATION, Options, build_options
 from kfgen.model.symbolic import to_sympy
 from kfgen.spec.tree import Expression
 from kfgen.spec.types import Matrix, Noise, Sensor, Spec
@@ -68,6 +69,7 @@ class Model:
     parameters: tuple[tuple[str, Fraction], ...]
     dt: Fraction | None  # None: given at run time
     dt_limits: tuple[Fraction | None, Fraction | None] = (None, None)
+    options: Options = field(default_factory=Options)
     _partials: dict[Symbolic, tuple[tuple[Symbolic, Symbolic], ...]] = field(default_factory=dict, repr=False)
 
     @property
@@ -193,6 +195,10 @@ class _Builder:
             parameters=tuple(parameters),
             dt=fixed,
             dt_limits=limits,
+            options=build_options(
+                spec.filter, [s.name for s in spec.states], self.number,
+                lambda e: self.tree(e, {**self.names, INNOVATION.name: INNOVATION}),
+            ),
         )
         return model
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from kfgen.filters import linalg
-from kfgen.filters.linalg import Symmetric
+from kfgen.filters.linalg import Measurement
+from kfgen.filters.symmetric import Symmetric
 
 TYPES = [float, np.float64]
 
@@ -38,7 +39,7 @@ def test_bierman_is_the_dense_update(seed):
     H = random.normal(size=(m, n)) * (random.random((m, n)) < 0.7)
     R = random.uniform(0.1, 1, m)
     P = dense(U, D)
-    gains, s = linalg.bierman(U, D, H.tolist(), R.tolist())
+    gains, s = linalg.bierman(U, D, [Measurement(h.tolist(), r) for h, r in zip(H, R, strict=True)])
     for h, r, K, variance in zip(H, R, gains, s, strict=True):
         expected = h @ P @ h + r
         assert variance == pytest.approx(expected, rel=1e-12)
@@ -52,12 +53,12 @@ def test_bierman_with_an_exact_measurement():
     """r = 0: the measured direction is known afterwards; measured again it is skipped."""
     U, D = [[1, 0.5], [0, 1]], [1.0, 2.0]
     P = dense(U, D)
-    gains, s = linalg.bierman(U, D, [[1.0, 0.0]], [0.0])
+    gains, s = linalg.bierman(U, D, [Measurement([1.0, 0.0], 0.0)])
     np.testing.assert_allclose(gains[0], P[:, 0] / P[0, 0], rtol=1e-15)
     assert s[0] == pytest.approx(P[0, 0])
     np.testing.assert_allclose(dense(U, D), joseph(P, np.array([1.0, 0]), 0, P[:, 0] / P[0, 0]), atol=1e-15)
     U, D = [[1, 0.0], [0, 1]], [0.0, 2.0]
-    gains, s = linalg.bierman(U, D, [[1.0, 0.0]], [0.0])
+    gains, s = linalg.bierman(U, D, [Measurement([1.0, 0.0], 0.0)])
     assert np.all(np.array(gains, dtype=float) == 0)
     assert s == [0.0]
     np.testing.assert_array_equal(dense(U, D), np.diag([0.0, 2.0]))
@@ -66,7 +67,7 @@ def test_bierman_with_an_exact_measurement():
 def test_six_equal_sensors():
     U, D = [[1]], [1e6]
     x = 0.0
-    gains, _ = linalg.bierman(U, D, [[1.0]] * 6, [1.0] * 6)
+    gains, _ = linalg.bierman(U, D, [Measurement([1.0], 1.0)] * 6)
     for (k,) in gains:
         x += k * (10 - x)
     assert x == pytest.approx(10, abs=1e-4)
@@ -175,10 +176,11 @@ def test_symmetric(seed):
     expected = joseph(P, h, r, K)
     S = symmetric(P)
     assert S.times(h.tolist()) == pytest.approx(c.tolist())
-    np.testing.assert_allclose(full(S.downdated(h.tolist(), r, c.tolist(), K.tolist())), expected, atol=1e-12)
-    np.testing.assert_allclose(full(S.joseph(h.tolist(), r, c.tolist(), K.tolist())), expected, atol=1e-12)
+    measured = Measurement(h.tolist(), r)
+    np.testing.assert_allclose(full(S.downdated(measured, c.tolist(), K.tolist())), expected, atol=1e-12)
+    np.testing.assert_allclose(full(S.joseph(measured, c.tolist(), K.tolist())), expected, atol=1e-12)
     other = K * random.uniform(0, 1, n)  # a gain that has been changed
-    made = full(S.joseph(h.tolist(), r, c.tolist(), other.tolist()))
+    made = full(S.joseph(measured, c.tolist(), other.tolist()))
     np.testing.assert_allclose(np.triu(made), np.triu(joseph(P, h, r, other)), atol=1e-12)
     F = random.normal(size=(n, n)) * (random.random((n, n)) < 0.6)
     np.testing.assert_allclose(full(S.congruent(F.tolist())), F @ P @ F.T, atol=1e-12)
