@@ -103,7 +103,7 @@ class _Scheduler:
 
     def _terms(self, node: Node, sign: int, top: bool, out: list[tuple[int, list[Node]]]) -> None:
         """The signed terms of a tree of additions whose inner nodes are used once."""
-        inner = top or not self._shared(node)
+        inner = top or not (self._shared(node) or node in self.local)
         if inner and node.op in ("add", "sub"):
             self._terms(node.args[0], sign, False, out)
             self._terms(node.args[1], sign if node.op == "add" else -sign, False, out)
@@ -214,19 +214,25 @@ class _Scheduler:
         for item in block.items:
             if isinstance(item, Node):
                 position[item] = epoch
-                continue
-            stack = [n for n in roots(item) if n.volatile]
-            met: set[int] = set()
-            while stack:
-                node = stack.pop()
-                if node.serial in met:
+                if not (self.uses[item] and self._shared(item)):
                     continue
-                met.add(node.serial)
-                if node in position and position[node] != epoch and node.kind != "int":
+                stack = [(a, epoch) for a in item.args if a.volatile]  # a local: evaluated here
+            else:
+                stack = [(n, epoch) for n in roots(item) if n.volatile]
+            met: set[tuple[int, int]] = set()
+            while stack:
+                node, when = stack.pop()
+                if (node.serial, when) in met:
+                    continue
+                met.add((node.serial, when))
+                made = position.get(node)
+                if made is not None and self._shared(node):
+                    continue
+                if made is not None and made != when and node.kind != "int":
                     forced.add(node)
                     self._local(node)
-                    continue
-                stack.extend(a for a in node.args if a.volatile)
+                    when = made
+                stack.extend((a, when) for a in node.args if a.volatile)
             if isinstance(item, Assign | Call | For | If):
                 epoch += 1
         return forced
