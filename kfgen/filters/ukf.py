@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from kfgen.filters import cloud, guards, linalg, process
+from kfgen.filters import cloud, guards, linalg, process, rolled
 from kfgen.filters.base import DT, INPUTS, KF, Block, FilterCode
 from kfgen.filters.cloud import Private
 from kfgen.filters.dual import Dual, Evaluator
@@ -18,7 +18,7 @@ from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector
 from kfgen.filters.noise import Given
 from kfgen.filters.numbers import is_zero
-from kfgen.filters.points import point_set
+from kfgen.filters.points import PointSet, point_set
 from kfgen.filters.process import Step
 from kfgen.filters.sensor import Linearised
 from kfgen.filters.symmetric import Symmetric
@@ -91,6 +91,10 @@ class Ukf(Ekf):
         if not self.simple:
             self.f = cloud.dynamics(self.model, self.carried, taken)
             self.privates.append(self.f.function)
+        self.absorb: Function | None = None
+        if self.loops and self.layout.factored and not self.simple:
+            self.absorb = rolled.absorb(self.n, self.scalar.smallest, taken)
+            self.privates.append(self.absorb)
         for seeing in self.seeing.values():
             self.privates += seeing.functions(taken)
         return super().code(taken)
@@ -130,10 +134,10 @@ class Ukf(Ekf):
         result = process.advance(t, model, prior, step, carried=self.carried)
         P0 = self.layout.load(t)
         t.section("sigma points")
-        columns, failures = self.root(t, P0, self._noise_root(t, prior.duals))
+        noise = self._noise_root(t, prior.duals)
         stride = self.n + len(self.carried)
         array = t.array("points", len(self.set.rows) * stride)
-        cloud.fill(t, array, self.set, columns)
+        failures = self.scatter(t, P0, noise, self.set, array)
         x, P, failed, shift = self._propagated(t, array, stride, prior.x, result, step)
         failures += failed
         for value, name in zip(x, model.states, strict=True):
@@ -158,6 +162,23 @@ class Ukf(Ekf):
             length = "one step"
         names = taken | {a.name for a in arguments}
         return Function("predict", arguments, schedule(t, names), f"Advance the estimate by {length}.")
+
+    @property
+    def loops(self) -> bool:
+        """Whether loops do what grows with the square of the states."""
+        many = self.n >= rolled.FROM and self.model.spec.code.unroll != "full"
+        return many and not self.own and self.set.extra >= 0
+
+    def scatter(
+        self, t: Trace, P: Covariance, noise: Rows, points: PointSet, array: Array, stored: bool = True
+    ) -> list[Value]:
+        """Write points of P into the array; conditions of failure. stored: P is that of the struct."""
+        if self.loops and stored:
+            rolled.scatter(t, array, points, rolled.root(t, self.layout, self.tolerance), self.n, noise)
+            return []
+        columns, failures = self.root(t, P, noise)
+        cloud.fill(t, array, points, columns)
+        return failures
 
     def root(self, t: Trace, P: Covariance, noise: Rows) -> tuple[list[Vector], list[Value]]:
         """Columns (n + q) of a root of P, in the spec's order, and of the noises'; conditions of failure."""
@@ -203,7 +224,15 @@ class Ukf(Ekf):
         Q = Given([[result.Q[i][j] for j in self.order] for i in self.order])
         noise = [([w[i] for i in self.order], d) for w, d in result.noise]
         common = points.wc[0] if points.uniform else None
-        gather = gatherer(t, self.layout, Q, noise, names, common, self.scalar.epsilon, not points.positive)
+        gather: Gatherer | rolled.Entries | rolled.Factors
+        if self.loops:
+            assert common is not None
+            if self.absorb is None:
+                gather = rolled.Entries(t, self.layout, Q, noise, common)
+            else:
+                gather = rolled.Factors(t, self.layout, Q, noise, common, self.absorb)
+        else:
+            gather = gatherer(t, self.layout, Q, noise, names, common, self.scalar.epsilon, not points.positive)
         t.section("points through f; deviations overwrite them")
         with t.loop("k", 0, count) as k:
             at = k * stride
@@ -224,7 +253,9 @@ class Ukf(Ekf):
             weight = cloud.weights(t, points.wm, k, "wm")
             for variable, d in zip(sums, deviations, strict=True):
                 variable.set(variable.get() + (d if points.uniform else weight * d))
-            if points.theta == 0:
+            if points.theta == 0 and isinstance(gather, rolled.Entries | rolled.Factors):
+                gather.add_row(array, at)
+            elif points.theta == 0:
                 gather.add([deviations[i] for i in self.order], common or cloud.weights(t, points.wc, k, "wc"))
         scale = points.wm[0] if points.uniform else Fraction(1)
         shift = [t.name(s.get() * scale, f"mean_{name}") for s, name in zip(sums, model.states, strict=True)]
@@ -234,13 +265,14 @@ class Ukf(Ekf):
             self._about_mean(t, gather, array, stride, inner, common)
         if points.extra > 0:
             gather.add(inner, points.extra)
-        elif points.extra < 0:
+        elif points.extra < 0 and not isinstance(gather, rolled.Entries | rolled.Factors):
             gather.subtract(inner, -points.extra)
         P, failures = gather.result()
         return [b + s for b, s in zip(base, shift, strict=True)], P, failures, shift
 
     def _about_mean(
-        self, t: Trace, gather: Gatherer, array: Array, stride: int, inner: Vector, common: Fraction | None
+        self, t: Trace, gather: Gatherer | rolled.Entries | rolled.Factors, array: Array, stride: int, inner: Vector,
+        common: Fraction | None,
     ) -> None:
         """Gather deviations less the mean's shift; those of negative weight last."""
         points = self.set
@@ -250,6 +282,11 @@ class Ukf(Ekf):
                 continue
             with t.loop("k", start, stop) as k:
                 at = k * stride
+                if isinstance(gather, rolled.Entries | rolled.Factors):
+                    for i, s in zip(self.order, inner, strict=True):
+                        array[at + i] = array[at + i] - s
+                    gather.add_row(array, at)
+                    continue
                 d = [array[at + i] - s for i, s in zip(self.order, inner, strict=True)]
                 weight = common or cloud.weights(t, points.wc, k, "wc")
                 if start == 0:

@@ -207,16 +207,16 @@ class Seeing:
                 straight[place][a] = value
         return Seen([p.value for p in linear.predicted], spread, straight, [])
 
-    def draw(self, ukf: Ukf, u: Update, P: Covariance, name: str = "") -> tuple[Array, list[Value]]:
-        """An array of points of P; conditions of failure."""
+    def draw(
+        self, ukf: Ukf, u: Update, P: Covariance, name: str = "", stored: bool = True
+    ) -> tuple[Array, list[Value]]:
+        """An array of points of P; conditions of failure. stored: P is that of the struct."""
         array = u.t.array(f"cloud{name}", len(self.points.rows) * self.stride)
-        return array, self.fill(ukf, u, P, array)
+        return array, ukf.scatter(u.t, P, self._noise_root(u), self.points, array, stored)
 
-    def fill(self, ukf: Ukf, u: Update, P: Covariance, array: Array) -> list[Value]:
-        """Write points of P into the array; conditions of failure."""
-        columns, failures = ukf.root(u.t, P, self._noise_root(u))
-        cloud.fill(u.t, array, self.points, columns)
-        return failures
+    def redraw(self, ukf: Ukf, u: Update, array: Array) -> list[Value]:
+        """Points of the stored P, in a branch of its own; conditions of failure."""
+        return ukf.scatter(u.t, u.layout.load(u.t), self._noise_root(u), self.points, array)
 
     def look(self, ukf: Ukf, u: Update) -> tuple[Array, Array, list[Value]]:
         """Through points of x and P, or through those that the last prediction kept: what is seen, the array of
@@ -231,7 +231,7 @@ class Seeing:
         array = t.array("cloud", len(self.points.rows) * self.stride)
         fresh = ~t.wrapped(t.pool.make("field", (), "kf.kept", "bool"))
         with t.when(fresh):
-            guards.positive(t, self.fill(ukf, u, u.layout.load(t), array))
+            guards.positive(t, self.redraw(ukf, u, array))
             self.run(u, seen, array)
         with t.when(~fresh):
             assert self.kept.see is not None
@@ -273,7 +273,7 @@ class Seeing:
     def residual(self, ukf: Ukf, u: Update, x: list[Value], P: Covariance) -> Vector:
         """z less what points of the new x and P predict."""
         t = u.t
-        array, failures = self.draw(ukf, u, P, "_after")
+        array, failures = self.draw(ukf, u, P, "_after", stored=False)
         guards.positive(t, failures)
         local, seen = t.array("after", self.n), t.array("seen_after", self.size)
         for i, value in enumerate(x):
@@ -380,9 +380,10 @@ def whole_vector(ukf: Ukf, seeing: Seeing, taken: frozenset[str], partial: bool)
         seen = seeing.read(t, out)
     linear = code.linearise(u.x)
     work = _Whole(ukf, u, seeing, linear, seen)
-    t.section("guards")
+    t.section("its covariance S = L D L^T")
     first = work.factored(seen)
     nis = t.name(first.nis, "nis")
+    t.section("guards")
     guards.finite(t, [*work.y(seen), *first.D, nis] if sensor.gate is None else [*work.y(seen), *first.D])
     guards.doubts(t, [v for row in linear.R for v in row])
     guards.positive(t, [*failures, *first.failures])
@@ -503,7 +504,7 @@ class _Whole:
         root = t.name(sqrt(factor), "root_inflation")
         with t.when(fails):
             if seeing.kept is not None:
-                guards.positive(t, seeing.fill(self.ukf, u, u.layout.load(t), array))
+                guards.positive(t, seeing.redraw(self.ukf, u, array))
             with t.loop("k", 0, len(seeing.points.rows)) as k:
                 for i in range(seeing.n):
                     array[k * seeing.stride + i] = array[k * seeing.stride + i] * root

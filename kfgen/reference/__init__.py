@@ -6,7 +6,8 @@ differentiation), and so is every formula.
 
 from kfgen.reference.build import reference
 from kfgen.reference.filter import ReferenceFilter
+from kfgen.reference.imm import ReferenceImm
 from kfgen.reference.log import Run
 from kfgen.reference.status import Status
 
-__all__ = ["ReferenceFilter", "Run", "Status", "reference"]
+__all__ = ["ReferenceFilter", "ReferenceImm", "Run", "Status", "reference"]

@@ -1,25 +1,27 @@
 """What a filter type has to provide, and what all of them do with a new estimate.
 
-An Algorithm holds no state of its own: it maps estimates to estimates, so that a filter (or a bank of them)
+An Estimator holds no state of its own: it maps estimates to estimates, so that a filter (or a bank of them)
 can drop a result and be what it was before.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kfgen.reference.adapt import NOTHING, Adaptation, Adapted
 from kfgen.reference.dual import Matrix, Vector, value_of
 from kfgen.reference.evaluate import Closure
+from kfgen.reference.gates import Gates
 from kfgen.reference.linalg import lower_root, udu
 from kfgen.reference.model import Context, Model
-from kfgen.reference.sensor import Reading
+from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.tree import Expression
+from kfgen.spec.types import Filter
 
 
 @dataclass(frozen=True)
@@ -53,22 +55,21 @@ class Correction:
     flags: Status = Status.OK
 
 
-class Algorithm(ABC):
-    """A filter type. Its methods raise StepError, or return finite, wrapped, bounded estimates.
+class Estimator(ABC):
+    """A filter type, or a bank of them. Its steps raise StepError, or return finite, wrapped, bounded estimates.
 
+    Attributes: model; sensors: by name, in the spec's order; options: of the filter, or of each of a bank;
     fixed_covariance: whether P never changes, and so cannot be set.
     """
 
+    model: Model
+    sensors: Mapping[str, SensorModel]
+    options: tuple[Filter, ...]
     fixed_covariance = False
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
-        self.limits = Limits(model)
-        self.adaptation = Adaptation(model)
-
+    @abstractmethod
     def initial(self) -> Estimate:
         """The estimate after init."""
-        return Estimate(self.model.x0, self.model.P0, adapted=self.adaptation.initial())
 
     @abstractmethod
     def predict(self, estimate: Estimate, context: Context) -> tuple[Estimate, Status]:
@@ -79,8 +80,51 @@ class Algorithm(ABC):
         """The innovation of a reading, by the plain residual and covariance: what the gate judges."""
 
     @abstractmethod
+    def judge(self, innovation: Innovation, reading: Reading, rejected: int) -> Status:
+        """What the gate says of a reading, `rejected` of whose sensor were in a row: see Gates.judge."""
+
+    @abstractmethod
     def correct(self, estimate: Estimate, reading: Reading, innovation: Innovation) -> Correction:
         """The update with a reading that has passed the gate."""
+
+    @abstractmethod
+    def placed(self, estimate: Estimate, change: Callable[[Vector], Vector]) -> Estimate:
+        """The estimate with x (n), or the x of every filter of a bank, changed; the covariance stays."""
+
+    @abstractmethod
+    def with_covariance(self, estimate: Estimate, P: Matrix) -> Estimate:
+        """The estimate with P (n, n) for its covariance, or for that of every filter of a bank; x stays."""
+
+    @abstractmethod
+    def redrawn(self, estimate: Estimate) -> Estimate:
+        """The estimate without the points kept for an update, which then draws its own."""
+
+
+class Algorithm(Estimator):
+    """A filter type."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.sensors = {sensor.name: SensorModel(model, sensor) for sensor in model.spec.measurements}
+        self.options = (model.spec.filter,)
+        self.limits = Limits(model)
+        self.adaptation = Adaptation(model)
+        self._gates = Gates(model)
+
+    def initial(self) -> Estimate:
+        return Estimate(self.model.x0, self.model.P0, adapted=self.adaptation.initial())
+
+    def judge(self, innovation: Innovation, reading: Reading, rejected: int) -> Status:
+        return self._gates.judge(reading, innovation.nis, rejected)
+
+    def placed(self, estimate: Estimate, change: Callable[[Vector], Vector]) -> Estimate:
+        return replace(estimate, x=change(estimate.x), memory=None)
+
+    def with_covariance(self, estimate: Estimate, P: Matrix) -> Estimate:
+        return replace(estimate, P=P, memory=None)
+
+    def redrawn(self, estimate: Estimate) -> Estimate:
+        return replace(estimate, memory=None)
 
 
 class Limits:

@@ -1,9 +1,14 @@
-"""Seconds since init, as the filter keeps them."""
+"""The time step, and seconds since init as the filter keeps them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+
+from kfgen.reference.status import Status, StepError
+from kfgen.spec.tree import Expression
+from kfgen.spec.types import Spec
 
 
 @dataclass(frozen=True)
@@ -30,3 +35,32 @@ class Clock:
         term = dt - self.lost
         total = self.total + term
         return replace(self, count=self.count + 1, total=total, lost=(total - self.total) - term)
+
+
+@dataclass(frozen=True)
+class Step:
+    """The bounds of a run-time step in s; None where it has none."""
+
+    run_time: bool
+    nominal: float
+    minimum: float | None = None
+    maximum: float | None = None
+
+    def clamped(self, dt: float) -> tuple[float, Status]:
+        """dt within its bounds, and DT_CLAMPED where that changed it. Raises StepError NOT_POSITIVE."""
+        if self.minimum is not None and dt < self.minimum:
+            return self.minimum, Status.DT_CLAMPED
+        if self.minimum is None and dt <= 0.0:
+            raise StepError(Status.NOT_POSITIVE)
+        if self.maximum is not None and dt > self.maximum:
+            return self.maximum, Status.DT_CLAMPED
+        return dt, Status.OK
+
+
+def step_of(spec: Spec, number: Callable[[Expression], float]) -> Step:
+    """The step of a spec; number gives an expression's value."""
+    dt = spec.dt
+    if dt is None:
+        return Step(False, 1.0)
+    bounds = [None if bound is None else number(bound) for bound in (dt.minimum, dt.maximum)]
+    return Step(dt.run_time, number(dt.nominal), *bounds)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
 
-from kfgen.reference.algorithm import Algorithm, Correction
-from kfgen.reference.clock import Clock
+from kfgen.reference.algorithm import Correction, Estimator
+from kfgen.reference.clock import Clock, step_of
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.linalg import lower_root, udu
 from kfgen.reference.log import Run, replay
@@ -20,27 +19,10 @@ from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.parameters import Parameters
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
-from kfgen.spec.types import Gate, Spec
+from kfgen.spec.types import Filter, Spec
 
-
-@dataclass(frozen=True)
-class _Step:
-    """The bounds of a run-time step in s; None where it has none."""
-
-    run_time: bool
-    nominal: float
-    minimum: float | None
-    maximum: float | None
-
-    def clamped(self, dt: float) -> tuple[float, Status]:
-        """dt within its bounds, and DT_CLAMPED where that changed it. Raises StepError NOT_POSITIVE."""
-        if self.minimum is not None and dt < self.minimum:
-            return self.minimum, Status.DT_CLAMPED
-        if self.minimum is None and dt <= 0.0:
-            raise StepError(Status.NOT_POSITIVE)
-        if self.maximum is not None and dt > self.maximum:
-            return self.maximum, Status.DT_CLAMPED
-        return dt, Status.OK
+if TYPE_CHECKING:
+    from kfgen.reference.imm import ModeView
 
 
 class ReferenceFilter:
@@ -59,31 +41,14 @@ class ReferenceFilter:
     shape (a missing u, an unknown sensor) raises TypeError, ValueError or KeyError.
     """
 
-    def __init__(self, spec: Spec, algorithm: Algorithm) -> None:
+    def __init__(self, spec: Spec, algorithm: Estimator) -> None:
         self.spec = spec
         self.model: Model = algorithm.model
         self.algorithm = algorithm
-        self.sensors = {sensor.name: SensorModel(self.model, sensor) for sensor in spec.measurements}
-        self._gates: dict[str, tuple[Gate, float]] = {
-            sensor.name: (sensor.gate, self.model.number(sensor.gate.probability))
-            for sensor in spec.measurements
-            if sensor.gate is not None
-        }
-        self._thresholds: dict[tuple[str, int], float] = {}
-        self._step = self._read_step()
+        self.sensors = algorithm.sensors
+        self._step = step_of(spec, self.model.number)
         self._fixed = fixed_step(spec)
         self.init()
-
-    def _read_step(self) -> _Step:
-        dt, number = self.spec.dt, self.model.number
-        if dt is None:
-            return _Step(False, 1.0, None, None)
-        return _Step(
-            dt.run_time,
-            number(dt.nominal),
-            None if dt.minimum is None else number(dt.minimum),
-            None if dt.maximum is None else number(dt.maximum),
-        )
 
     @property
     def x(self) -> Vector:
@@ -95,13 +60,14 @@ class ReferenceFilter:
 
     @property
     def sqrt_covariance(self) -> Matrix:
-        self._require("sqrt_covariance", self.spec.filter.covariance == "sqrt", "covariance: sqrt")
+        self._require("sqrt_covariance", self._any(_is_root), "covariance: sqrt")
         return lower_root(self._estimate.P)
 
     @property
     def R(self) -> dict[str, Matrix]:
-        self._require("R", self.algorithm.adaptation.R, "adapt_R")
-        return {name: R.copy() for name, R in self._estimate.adapted.R.items()}
+        R = self._estimate.adapted.R
+        self._require("R", bool(R), "adapt_R")
+        return {name: matrix.copy() for name, matrix in R.items()}
 
     @property
     def Q(self) -> Matrix:
@@ -111,12 +77,29 @@ class ReferenceFilter:
         return Q.copy()
 
     @property
+    def mu(self) -> Vector:
+        """The probabilities (B) of the modes of an imm."""
+        raise self._missing("mu", "imm")
+
+    @property
+    def modes(self) -> tuple[ModeView, ...]:
+        """The modes of an imm, in the spec's order."""
+        raise self._missing("modes", "imm")
+
+    @property
     def t(self) -> float:
         return self._clock.now
 
+    def _any(self, holds: Callable[[Filter], bool]) -> bool:
+        """Whether a condition holds for the filter's options, or for those of one of a bank."""
+        return any(map(holds, self.algorithm.options))
+
     def _require(self, what: str, there: bool, option: str) -> None:
         if not there:
-            raise AttributeError(f"filter {self.spec.name} has no {what}; its spec has no `{option}`")
+            raise self._missing(what, option)
+
+    def _missing(self, what: str, option: str) -> AttributeError:
+        return AttributeError(f"filter {self.spec.name} has no {what}; its spec has no `{option}`")
 
     def _require_variable(self) -> None:
         if self.algorithm.fixed_covariance:
@@ -139,7 +122,7 @@ class ReferenceFilter:
         new = np.array(x, dtype=np.float64).reshape(self.model.n)
         if not np.all(np.isfinite(new)):
             return int(Status.NOT_FINITE)
-        self._estimate = replace(self._estimate, x=self.model.wrap(new), memory=None)
+        self._estimate = self.algorithm.placed(self._estimate, lambda x: self.model.wrap(new))
         return int(Status.OK)
 
     def set_covariance(self, P: ArrayLike) -> int:
@@ -157,7 +140,7 @@ class ReferenceFilter:
         if np.any(D == 0.0):
             # a pivot that is negative or positive only by rounding is the zero it stands for
             new = (U * D) @ U.T
-        self._estimate = replace(self._estimate, P=new, memory=None)
+        self._estimate = self.algorithm.with_covariance(self._estimate, new)
         return int(Status.OK)
 
     def set_sqrt_covariance(self, S: ArrayLike) -> int:
@@ -165,22 +148,20 @@ class ReferenceFilter:
 
         NOT_FINITE leaves the filter as it was. The sign of a column makes no difference to P.
         """
-        self._require("set_sqrt_covariance", self.spec.filter.covariance == "sqrt", "covariance: sqrt")
+        self._require("set_sqrt_covariance", self._any(_is_root), "covariance: sqrt")
         self._require_variable()
         root = np.tril(np.array(S, dtype=np.float64).reshape(self.model.n, self.model.n))
         with np.errstate(all="ignore"):
             new = root @ root.T
         if not np.all(np.isfinite(new)):
             return int(Status.NOT_FINITE)
-        self._estimate = replace(self._estimate, P=new, memory=None)
+        self._estimate = self.algorithm.with_covariance(self._estimate, new)
         return int(Status.OK)
 
     def redraw(self) -> int:
         """Draws the points that predict has kept for an update anew, from x and P (`redraw: false` only)."""
-        points = self.spec.filter.sigma_points
-        self._require("redraw", points is not None and not points.redraw, "redraw: false")
-        # without kept points an update draws its own
-        self._estimate = replace(self._estimate, memory=None)
+        self._require("redraw", self._any(_keeps_points), "redraw: false")
+        self._estimate = self.algorithm.redrawn(self._estimate)
         return int(Status.OK)
 
     def predict(self, u: ArrayLike | None = None, dt: float | None = None) -> int:
@@ -242,26 +223,16 @@ class ReferenceFilter:
         """An update behind the gate: the whole vector, or nothing of it."""
         name = reading.sensor.name
         innovation = self.algorithm.innovate(self._estimate, reading)
-        flags = Status.OK
-        if name in self._gates and innovation.nis > self._threshold(name, len(reading.used)):
-            reset_after = self._gates[name][0].reset_after
-            if reset_after is None or self.gate_count[name] < reset_after:
-                self.nis = innovation.nis
-                self.gate_count[name] += 1
-                return Status.GATED
-            flags = Status.ANOMALY
+        verdict = self.algorithm.judge(innovation, reading, self.gate_count[name])
+        if verdict == Status.GATED:
+            self.nis = innovation.nis
+            self.gate_count[name] += 1
+            return verdict
         correction: Correction = self.algorithm.correct(self._estimate, reading, innovation)
         self._estimate = correction.estimate
         self.nis, self.log_likelihood = innovation.nis, correction.log_likelihood
         self.gate_count[name] = 0
-        return flags | correction.flags
-
-    def _threshold(self, sensor: str, used: int) -> float:
-        """The chi-square quantile of a sensor's gate with so many components."""
-        key = (sensor, used)
-        if key not in self._thresholds:
-            self._thresholds[key] = float(chi2.ppf(self._gates[sensor][1], used))
-        return self._thresholds[key]
+        return verdict | correction.flags
 
     def _initialises(self, reading: Reading) -> bool:
         """Whether this reading is the first one of the sensor that sets the initial states."""
@@ -275,13 +246,26 @@ class ReferenceFilter:
         """Sets the states that the spec names from the reading; the covariance stays, no update is made."""
         rule = self.spec.initialize
         assert rule is not None
-        x = self.x
-        for state, component in rule.states.items():
-            x[self.model.index[state]] = reading.z[reading.sensor.components.index(component)]
-        self._estimate = replace(self._estimate, x=self.model.wrap(self.model.clip(x)), memory=None)
+        components = reading.sensor.components
+        entries = {self.model.index[state]: components.index(component) for state, component in rule.states.items()}
+
+        def change(x: Vector) -> Vector:
+            x = x.copy()
+            x[list(entries)] = reading.z[list(entries.values())]
+            return self.model.wrap(self.model.clip(x))
+
+        self._estimate = self.algorithm.placed(self._estimate, change)
         self._uninitialised = False
         self.nis = 0.0
         return Status.OK
+
+
+def _is_root(options: Filter) -> bool:
+    return options.covariance == "sqrt"
+
+
+def _keeps_points(options: Filter) -> bool:
+    return options.sigma_points is not None and not options.sigma_points.redraw
 
 
 def _used(sensor: SensorModel, mask: int | Sequence[bool] | None) -> tuple[int, ...]:

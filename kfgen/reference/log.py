@@ -22,13 +22,15 @@ class Run:
     """A filter's course over a log of r rows, after each row.
 
     x (r, n), var (r, n): the estimate and the diagonal of its covariance. nis: sensor -> (r), NaN in rows
-    without an update of it (or with one that failed). status (r): the bits of the row's calls, or-ed.
+    without an update of it (or with one that failed). status (r): the bits of the row's calls, or-ed. mu (r, B):
+    the probabilities of the modes of an imm, else None.
     """
 
     x: Matrix
     var: Matrix
     nis: dict[str, Vector]
     status: NDArray[np.int64]
+    mu: Matrix | None = None
 
 
 def replay(kf: ReferenceFilter, log: Mapping[str, Sequence[float]]) -> Run:
@@ -60,6 +62,7 @@ def replay(kf: ReferenceFilter, log: Mapping[str, Sequence[float]]) -> Run:
         np.zeros((rows, kf.model.n)),
         {name: np.full(rows, math.nan) for name in kf.sensors},
         np.zeros(rows, dtype=np.int64),
+        None if kf.spec.imm is None else np.zeros((rows, len(kf.spec.imm.modes))),
     )
     last: float | None = None
     for row in range(rows):
@@ -77,6 +80,8 @@ def replay(kf: ReferenceFilter, log: Mapping[str, Sequence[float]]) -> Run:
             status |= _measure(kf, name, reading[row], u, result, row)
         result.status[row] = status
         result.x[row], result.var[row] = kf.x, kf.P.diagonal()
+        if result.mu is not None:
+            result.mu[row] = kf.mu
     return result
 
 

@@ -14,6 +14,10 @@ that is right lies in its chi-square band; the tests hold those that promise it 
   sensor. Consistent.
 * `ekf2`: adds what second derivatives do to mean and covariance; what is linear costs nothing. Consistent, also where
   curvature makes an ekf too sure of itself.
+* `ukf`: sigma points instead of derivatives: right to second order, and of use where derivatives are not (kinks,
+  strong curvature, angles). Consistent. It costs one run of f, and of an h that is not linear, per point: 2 n + 1.
+  `covariance: sqrt` and `ud` never lose positive definiteness to round-off; `sequential: true` is cheap but leaves
+  out the covariance of the linearisation error, so that P is too small where h is curved.
 * `covariance: sqrt`: a triangular root, with half the range of exponents; one root and one quotient per state and
   scalar measurement. As the ekf.
 * `gate`: refuses a whole vector that is improbable. Nearly consistent: true tails are refused too.
@@ -36,6 +40,11 @@ Where outliers occur combine it with `robust`, which weighs first (the default q
 `robust` normalises an innovation by the root of R alone. While P is much larger than R, after a start far from the
 truth, ordinary innovations count as glitches; huber then gives them no weight in P at all and may never lock on. Start
 such a filter with `initialize`; chernodarov recovers more often, since its weight falls in two steps.
+
+A noise input that does not enter linearly (a factor of a state, say) is carried by the sigma points as one more
+dimension. Points see second moments: of a product x (1 + e) at x = 0 they see nothing of e. alpha below 0.05 spreads
+the points so little that float rounding decides; nothing else suffers, since deviations are taken from the centre's
+image and no large weights occur.
 
 nis and the gate always judge by the plain innovation and H P H^T + R, before weights, inflation and changed gains.
 `log_likelihood` is that of the update as it was made.

@@ -19,6 +19,7 @@ from kfgen.simulate import simulate
         ("scalar", 0.34, 1.66),
         ("cv2d", 0.67, 1.33),
         ("cv4", 0.67, 1.33),
+        ("pendulum", 0.53, 1.47),  # 2 states
     ],
 )
 def test_the_covariance_is_the_error(build, consistency, name, low, high):
@@ -88,3 +89,31 @@ def test_the_tutorial_tracks_a_vehicle(build):
     assert 0.9 < np.median(nis) < 1.4  # measured: 1.18
     assert math.sqrt(np.median(position)) < 0.805  # 1.394/sqrt(3): a single measurement; measured: 0.75
     assert 0.8 < np.median(share) < 1.4  # measured: 1.05
+
+
+def test_pendulum_turns_over(build):
+    """A push over the top: the estimate follows across the seam of the angle."""
+    kf = build("pendulum")
+    kf.set_state([3.0, 3.0])
+    kf.set_covariance([[1e-2, 0], [0, 1e-1]])
+    angle, rate = 3.0, 3.0
+    for _ in range(100):
+        for _ in range(20):
+            rate += 1e-3 * (-9.81 / 0.5 * math.sin(angle) - 0.1 * rate)
+            angle += 1e-3 * rate
+        assert kf.predict() == Status.OK
+        assert kf.update("camera", [0.5 * math.sin(angle), -0.5 * math.cos(angle)]) == Status.OK
+        assert -math.pi < kf.x[0] <= math.pi
+    assert math.remainder(kf.x[0] - angle, 2 * math.pi) == pytest.approx(0, abs=0.05)
+
+
+def test_tracker_does_not_believe_a_fix_that_is_far_off(build):
+    kf = build("tracker")
+    kf.run(simulate(kf.spec, 200, seed=5))
+    before, P = kf.x, kf.P
+    kf.predict()
+    ahead = before[:2] + 0.1 * before[2:]
+    assert kf.update("fix", [ahead[0] + 500, ahead[1]]) & Status.GLITCH_LARGE
+    assert abs(kf.x[0] - ahead[0]) < 3 * math.sqrt(P[0, 0])  # 500 m away, moved by a metre or two
+    assert kf.P[0, 0] > P[0, 0]  # and nothing is believed of it
+    assert kf.update("fix", [math.nan, ahead[1]], mask=0b10) == Status.OK

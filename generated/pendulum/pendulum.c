@@ -1,0 +1,472 @@
+/* kfgen build pendulum.yaml */
+#include "pendulum.h"
+
+#include <math.h>
+
+#if defined(__FAST_MATH__)
+#error "pendulum tests for NaN and infinity, which -ffast-math removes"
+#endif
+
+/* false for NaN and for infinity: their difference from themselves is NaN */
+static bool pendulum_finite(float a)
+{
+    return a - a >= 0.0f;
+}
+
+/* a in (-half, half], by whole turns of 2 half */
+static float pendulum_wrap(float a, float half)
+{
+    if (a > half || a <= -half) {
+        a -= (half + half) * ceilf((a - half) / (half + half));
+        if (a > half || a <= -half) { a = half; } /* the last bit of a turn */
+    }
+    return a;
+}
+
+pendulum_status_t pendulum_init(pendulum_t *kf)
+{
+    if (kf == NULL) { return PENDULUM_NULL_ARGUMENT; }
+    kf->x[PENDULUM_ANGLE] = 0.5f;
+    kf->x[PENDULUM_RATE] = 0.0f;
+    kf->S[0] = 0.2f;
+    kf->S[1] = 0.0f;
+    kf->S[2] = 1.0f;
+    kf->nis = 0.0f;
+    kf->gate_count_camera = 0;
+    return PENDULUM_OK;
+}
+
+/* x <- f(x, u, w), in place */
+static void pendulum_f(pendulum_real_t x[4])
+{
+    const float push = x[2];
+    const float damping = x[3];
+    const float angle = x[PENDULUM_ANGLE];
+    const float rate = x[PENDULUM_RATE];
+    const float sin_angle = sinf(angle);
+    const float t0 = 0.1f + damping;
+    const float t1 = push - 19.62f * sin_angle - rate * t0;
+    const float t2 = rate + 0.01f * t1;
+    const float sin_angle_1 = sinf(angle + 0.01f * rate);
+    const float t3 = push - 19.62f * sin_angle_1 - t2 * t0;
+    const float t4 = rate + 0.01f * t3;
+    const float sin_angle_2 = sinf(angle + 0.01f * t2);
+    const float t5 = push - 19.62f * sin_angle_2 - t4 * t0;
+    const float t6 = rate + 0.02f * t5;
+    const float sin_angle_3 = sinf(angle + 0.02f * t4);
+    x[PENDULUM_ANGLE] = angle + 0.0033333334f * (rate + 2.0f * (t2 + t4) + t6);
+    x[PENDULUM_RATE] = rate + 0.0033333334f
+        * (t1 + 2.0f * (t3 + t5) + push - 19.62f * sin_angle_3 - t6 * t0);
+}
+
+/* what camera measures at x */
+static void pendulum_h_camera(const pendulum_real_t x[2], pendulum_real_t z[2])
+{
+    const float angle = x[PENDULUM_ANGLE];
+    const float sin_angle = sinf(angle);
+    z[0] = 0.5f * sin_angle;
+    const float cos_angle = cosf(angle);
+    z[1] = -(0.5f * cos_angle);
+}
+
+/* what the points predict of camera: mean, covariance, covariances with the state */
+static void pendulum_see_camera(const pendulum_real_t x[2],
+                                const pendulum_real_t cloud[8],
+                                pendulum_real_t seen[9])
+{
+    const float angle = x[PENDULUM_ANGLE];
+    const float rate = x[PENDULUM_RATE];
+    float point[2];
+    float z[2];
+    point[0] = angle;
+    point[1] = rate;
+    pendulum_h_camera(point, z);
+    const float x_centre = z[0];
+    const float y_centre = z[1];
+    float shift_x = 0.0f;
+    float shift_y = 0.0f;
+    float s_x_x = 0.0f;
+    float s_x_y = 0.0f;
+    float s_y_y = 0.0f;
+    float c_angle_x = 0.0f;
+    float c_angle_y = 0.0f;
+    float c_rate_x = 0.0f;
+    float c_rate_y = 0.0f;
+
+    /* points through h */
+    for (int k = 0; k < 4; k++) {
+        point[0] = angle + cloud[2 * k];
+        point[1] = rate + cloud[2 * k + 1];
+        pendulum_h_camera(point, z);
+        const float dz_x = z[0] - x_centre;
+        const float dz_y = z[1] - y_centre;
+        shift_x = shift_x + dz_x;
+        shift_y = shift_y + dz_y;
+        s_x_x = s_x_x + dz_x * dz_x;
+        s_x_y = s_x_y + dz_x * dz_y;
+        s_y_y = s_y_y + dz_y * dz_y;
+        c_angle_x = c_angle_x + cloud[2 * k] * dz_x;
+        c_angle_y = c_angle_y + cloud[2 * k] * dz_y;
+        c_rate_x = c_rate_x + cloud[2 * k + 1] * dz_x;
+        c_rate_y = c_rate_y + cloud[2 * k + 1] * dz_y;
+    }
+    const float mean_x = 0.6666667f * shift_x;
+    const float mean_y = 0.6666667f * shift_y;
+    seen[0] = x_centre + mean_x;
+    seen[1] = y_centre + mean_y;
+    seen[2] = 0.6666667f * s_x_x + 1.75f * (mean_x * mean_x);
+    seen[3] = 0.6666667f * s_x_y + 1.75f * (mean_x * mean_y);
+    seen[4] = 0.6666667f * s_y_y + 1.75f * (mean_y * mean_y);
+    seen[5] = 0.6666667f * c_angle_x;
+    seen[6] = 0.6666667f * c_angle_y;
+    seen[7] = 0.6666667f * c_rate_x;
+    seen[8] = 0.6666667f * c_rate_y;
+}
+
+pendulum_status_t pendulum_predict(pendulum_t *kf)
+{
+    if (kf == NULL) { return PENDULUM_NULL_ARGUMENT; }
+    const float angle = kf->x[PENDULUM_ANGLE];
+    const float rate = kf->x[PENDULUM_RATE];
+
+    /* sigma points */
+    float points[32];
+    const float t1 = 1.118034f * kf->S[0];
+    const float t2 = 1.118034f * kf->S[1];
+    points[0] = t1;
+    points[1] = t2;
+    points[2] = 0.0f;
+    points[3] = 0.0f;
+    points[4] = -t1;
+    points[5] = -t2;
+    points[6] = 0.0f;
+    points[7] = 0.0f;
+    points[8] = 0.0f;
+    const float t3 = 1.118034f * kf->S[2];
+    points[9] = t3;
+    points[10] = 0.0f;
+    points[11] = 0.0f;
+    points[12] = 0.0f;
+    points[13] = -t3;
+    points[14] = 0.0f;
+    points[15] = 0.0f;
+    points[16] = 0.0f;
+    points[17] = 0.0f;
+    points[18] = 0.3354102f;
+    points[19] = 0.0f;
+    points[20] = 0.0f;
+    points[21] = 0.0f;
+    points[22] = -0.3354102f;
+    points[23] = 0.0f;
+    points[24] = 0.0f;
+    points[25] = 0.0f;
+    points[26] = 0.0f;
+    points[27] = 0.0559017f;
+    points[28] = 0.0f;
+    points[29] = 0.0f;
+    points[30] = 0.0f;
+    points[31] = -0.0559017f;
+    float centre[4];
+    centre[0] = angle;
+    centre[1] = rate;
+    centre[2] = 0.0f;
+    centre[3] = 0.0f;
+    pendulum_f(centre);
+    const float angle_centre = centre[0];
+    const float rate_centre = centre[1];
+    float shift_angle = 0.0f;
+    float shift_rate = 0.0f;
+    float u_rate_angle = 0.0f;
+    float d_rate = 0.0f;
+    float d_angle = 0.0f;
+
+    /* points through f; deviations overwrite them */
+    for (int k = 0; k < 8; k++) {
+        points[4 * k] = points[4 * k] + angle;
+        points[4 * k + 1] = points[4 * k + 1] + rate;
+        pendulum_f(&points[4 * k]);
+        const float dev_angle = pendulum_wrap(points[4 * k] - angle_centre, 3.1415927f);
+        const float dev_rate = points[4 * k + 1] - rate_centre;
+        points[4 * k] = dev_angle;
+        points[4 * k + 1] = dev_rate;
+        shift_angle = shift_angle + dev_angle;
+        shift_rate = shift_rate + dev_rate;
+        const float t5 = 0.4f * dev_angle;
+        const float t6 = d_angle + dev_angle * t5;
+        const bool t7 = t6 > 0.0f;
+        const float t8 = dev_rate - dev_angle * u_rate_angle;
+        const float t4 = d_rate + t8 * (0.4f * (t7 ? d_angle / t6 : 1.0f) * t8);
+        u_rate_angle = u_rate_angle + (t7 ? t5 / t6 : 0.0f) * t8;
+        d_rate = t4;
+        d_angle = t6;
+    }
+    const float mean_angle = 0.4f * shift_angle;
+    const float mean_rate = 0.4f * shift_rate;
+    const float t9 = 0.7f * shift_angle;
+    const float t10 = d_angle + mean_angle * t9;
+    const bool t11 = t10 > 0.0f;
+    const float t12 = mean_rate - mean_angle * u_rate_angle;
+    const float t0 = d_rate + t12 * (1.75f * (t11 ? d_angle / t10 : 1.0f) * t12);
+    u_rate_angle = u_rate_angle + (t11 ? t9 / t10 : 0.0f) * t12;
+    d_rate = t0;
+    d_angle = t10;
+
+    /* roots */
+    const float s_rate_rate = sqrtf(d_rate);
+    const float s_angle_angle = sqrtf(d_angle);
+    const float s_rate_angle = u_rate_angle * s_angle_angle;
+    const float angle_next = angle_centre + mean_angle;
+    const float rate_next = rate_centre + mean_rate;
+    const float t13 = pendulum_wrap(angle_next, 3.1415927f);
+
+    /* guards */
+    if (!pendulum_finite(t13 + rate_next + s_rate_rate + s_angle_angle)) {
+        return PENDULUM_NOT_FINITE;
+    }
+
+    /* store */
+    kf->x[PENDULUM_ANGLE] = t13;
+    kf->x[PENDULUM_RATE] = rate_next;
+    kf->S[0] = s_angle_angle;
+    kf->S[1] = s_rate_angle;
+    kf->S[2] = s_rate_rate;
+    return PENDULUM_OK;
+}
+
+pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t *z)
+{
+    if (kf == NULL || z == NULL) { return PENDULUM_NULL_ARGUMENT; }
+    pendulum_status_t flags = PENDULUM_OK;
+
+    /* innovation */
+    const float angle = kf->x[PENDULUM_ANGLE];
+    float seen[9];
+    float cloud[8];
+    const float t0 = 0.8660254f * kf->S[0];
+    const float t1 = 0.8660254f * kf->S[1];
+    cloud[0] = t0;
+    cloud[1] = t1;
+    cloud[2] = -t0;
+    cloud[3] = -t1;
+    cloud[4] = 0.0f;
+    const float t2 = 0.8660254f * kf->S[2];
+    cloud[5] = t2;
+    cloud[6] = 0.0f;
+    cloud[7] = -t2;
+    pendulum_see_camera(kf->x, cloud, seen);
+    const float h_x = seen[0];
+    const float h_y = seen[1];
+
+    /* its covariance S = L D L^T */
+    const float s_x = seen[2] + 0.0001f;
+    const float y_x = z->x - h_x;
+    const float y_y = z->y - h_y;
+    const float t3 = 1.0f / s_x;
+    const float t4 = seen[3] * t3;
+    const float s_y = seen[4] + 0.0001f - t4 * seen[3];
+    const float t5 = y_y - t4 * y_x;
+    const float t6 = seen[6] - t4 * seen[5];
+    const float t7 = seen[8] - t4 * seen[7];
+    const float t8 = y_x * t3;
+    const float t9 = t5 * (1.0f / s_y);
+    const float nis = y_x * t8 + t5 * t9;
+
+    /* guards */
+    if (!pendulum_finite(y_x + y_y + s_x + s_y)) { return PENDULUM_NOT_FINITE; }
+    if (!(s_x > 0.0f) || !(s_y > 0.0f)) { return PENDULUM_NOT_POSITIVE; }
+
+    /* gate */
+    const bool t10 = nis > 13.815511f;
+    if (t10 && kf->gate_count_camera < 10) {
+        kf->nis = nis;
+        kf->gate_count_camera = kf->gate_count_camera + 1;
+        return flags | PENDULUM_GATED;
+    }
+    if (t10) { flags |= PENDULUM_ANOMALY; }
+
+    /* gain and covariance */
+    const float t11 = 1.0f / sqrtf(s_x);
+    const float t12 = seen[7] * t11;
+    const float t13 = seen[5] * t11;
+    const float t14 = kf->S[0] * kf->S[0];
+    const float t15 = t13 * t13;
+    const bool t16 = 3.637979e-12f * t14 < t15;
+    const float t17 = t14 - t15;
+    const float t18 = 1.9073486e-6f * t14;
+    const bool t19 = t16 && t17 <= t18;
+    if (t19) { flags |= PENDULUM_REGULARIZED; }
+    const bool t20 = !t19;
+    const bool t21 = t16 && t20;
+    const float t22 = sqrtf(t21 ? t17 : 1.0f);
+    const float t23 = t21 ? 1.0f / kf->S[0] : 0.0f;
+    const float t24 = t13 * t23;
+    const float t25 = t19 ? 0.0f : (t21 ? t22 : kf->S[0]);
+    const float t26 = (kf->S[1] - t24 * t12) * (t21 ? kf->S[0] * (1.0f / t22) : 1.0f);
+    const float t27 = (t21 ? t22 * t23 : 1.0f) * t12 - t24 * t26;
+    const float t28 = t19 ? 0.0f : t26;
+    const float t29 = kf->S[2] * kf->S[2];
+    const float t30 = t27 * t27;
+    const bool t31 = t20 && 3.637979e-12f * (t29 + t28 * t28) < t30;
+    const float t32 = t29 - t30;
+    const float t33 = 1.9073486e-6f * t29;
+    const bool t34 = t31 && t32 <= t33;
+    if (t34) { flags |= PENDULUM_REGULARIZED; }
+    const bool t35 = t31 && !t34;
+    const float t36 = t34 ? 0.0f : (t35 ? sqrtf(t35 ? t32 : 1.0f) : kf->S[2]);
+    const float t37 = 1.0f / sqrtf(s_y);
+    const float t38 = t7 * t37;
+    const float t39 = t6 * t37;
+    const float t40 = t25 * t25;
+    const float t41 = t39 * t39;
+    const bool t42 = 3.637979e-12f * t40 < t41;
+    const float t43 = t40 - t41;
+    const float t44 = 1.9073486e-6f * t40;
+    const bool t45 = t42 && t43 <= t44;
+    if (t45) { flags |= PENDULUM_REGULARIZED; }
+    const bool t46 = !t45;
+    const bool t47 = t42 && t46;
+    const float t48 = sqrtf(t47 ? t43 : 1.0f);
+    const float t49 = t47 ? 1.0f / t25 : 0.0f;
+    const float t50 = t39 * t49;
+    const float s_angle_angle = t45 ? 0.0f : (t47 ? t48 : t25);
+    const float t51 = (t28 - t50 * t38) * (t47 ? t25 * (1.0f / t48) : 1.0f);
+    const float t52 = (t47 ? t48 * t49 : 1.0f) * t38 - t50 * t51;
+    const float s_rate_angle = t45 ? 0.0f : t51;
+    const float t53 = t36 * t36;
+    const float t54 = t52 * t52;
+    const bool t55 = t46 && 3.637979e-12f * (t53 + s_rate_angle * s_rate_angle) < t54;
+    const float t56 = t53 - t54;
+    const float t57 = 1.9073486e-6f * t53;
+    const bool t58 = t55 && t56 <= t57;
+    if (t58) { flags |= PENDULUM_REGULARIZED; }
+    const bool t59 = t55 && !t58;
+    const float s_rate_rate = t58 ? 0.0f : (t59 ? sqrtf(t59 ? t56 : 1.0f) : t36);
+
+    /* state */
+    const float rate_next = kf->x[PENDULUM_RATE] + seen[7] * t8 + t7 * t9;
+    const float angle_next = angle + seen[5] * t8 + t6 * t9;
+    const float t60 = pendulum_wrap(angle_next, 3.1415927f);
+
+    /* guards */
+    if (!pendulum_finite(nis + t60 + rate_next)) { return PENDULUM_NOT_FINITE; }
+    if ((t16 && t17 < -t18) || (t31 && t32 < -t33) || (t42 && t43 < -t44) || (t55 && t56 < -t57)) {
+        return PENDULUM_NOT_POSITIVE;
+    }
+
+    /* store */
+    kf->x[PENDULUM_ANGLE] = t60;
+    kf->x[PENDULUM_RATE] = rate_next;
+    kf->S[0] = s_angle_angle;
+    kf->S[1] = s_rate_angle;
+    kf->S[2] = s_rate_rate;
+    kf->gate_count_camera = 0;
+    kf->nis = nis;
+    return flags;
+}
+
+pendulum_status_t pendulum_set_state(pendulum_t *kf, const pendulum_real_t x[2])
+{
+    if (kf == NULL || x == NULL) { return PENDULUM_NULL_ARGUMENT; }
+    if (!pendulum_finite(x[PENDULUM_ANGLE])) { return PENDULUM_NOT_FINITE; }
+    if (!pendulum_finite(x[PENDULUM_RATE])) { return PENDULUM_NOT_FINITE; }
+    kf->x[PENDULUM_ANGLE] = pendulum_wrap(x[PENDULUM_ANGLE], 3.1415927f);
+    kf->x[PENDULUM_RATE] = x[PENDULUM_RATE];
+    return PENDULUM_OK;
+}
+
+pendulum_status_t pendulum_set_covariance(pendulum_t *kf, const pendulum_real_t P[4])
+{
+    if (kf == NULL || P == NULL) { return PENDULUM_NULL_ARGUMENT; }
+    float p[3];
+    float w[3];
+
+    /* the upper triangle, column by column */
+    for (int j = 0; j < 2; j++) {
+        for (int i = 0; i < j + 1; i++) {
+            const float value = P[2 * (1 - j) + (1 - i)];
+            p[j * (j + 1) / 2 + i] = value;
+            w[j * (j + 1) / 2 + i] = value;
+            if (!pendulum_finite(value)) { return PENDULUM_NOT_FINITE; }
+        }
+    }
+
+    /* factor it: a pivot is zero up to round-off, or positive */
+    for (int j = 2 - 1; j >= 0; j--) {
+        const float round_off = 2.3841858e-7f * p[j * (j + 1) / 2 + j];
+        const float pivot = w[j * (j + 1) / 2 + j];
+        if (pivot < -round_off) { return PENDULUM_NOT_POSITIVE; }
+        const float d = round_off < pivot ? pivot : 0.0f;
+        w[j * (j + 1) / 2 + j] = d;
+        for (int i = j - 1; i >= 0; i--) {
+            const float rest = w[j * (j + 1) / 2 + i];
+            if (d <= 0.0f && 9.536743e-7f * p[j * (j + 1) / 2 + j] * p[i * (i + 1) / 2 + i] < rest
+                * rest) {
+                return PENDULUM_NOT_POSITIVE;
+            }
+            const float u = d > 0.0f ? rest / d : 0.0f;
+            for (int k = 0; k < i + 1; k++) {
+                w[i * (i + 1) / 2 + k] = w[i * (i + 1) / 2 + k] - u * w[j * (j + 1) / 2 + k];
+            }
+            w[j * (j + 1) / 2 + i] = u;
+        }
+    }
+
+    /* store */
+    for (int j = 0; j < 2; j++) {
+        const float root = sqrtf(w[j * (j + 1) / 2 + j]);
+        kf->S[(1 - j) * (1 - j + 1) / 2 + (1 - j)] = root;
+        for (int i = 0; i < j; i++) {
+            kf->S[(1 - i) * (1 - i + 1) / 2 + (1 - j)] = w[j * (j + 1) / 2 + i] * root;
+        }
+    }
+    return PENDULUM_OK;
+}
+
+void pendulum_get_covariance(const pendulum_t *kf, pendulum_real_t P[4])
+{
+    if (kf == NULL || P == NULL) { return; }
+    for (int j = 0; j < 2; j++) {
+        for (int i = 0; i < j + 1; i++) {
+            float sum = 0.0f;
+            for (int k = j; k < 2; k++) {
+                sum = sum + kf->S[(1 - i) * (1 - i + 1) / 2 + (1 - k)]
+                    * kf->S[(1 - j) * (1 - j + 1) / 2 + (1 - k)];
+            }
+            const float value = sum;
+            P[2 * (1 - i) + (1 - j)] = value;
+            P[2 * (1 - j) + (1 - i)] = value;
+        }
+    }
+}
+
+pendulum_status_t pendulum_set_sqrt_covariance(pendulum_t *kf, const pendulum_real_t S[4])
+{
+    if (kf == NULL || S == NULL) { return PENDULUM_NULL_ARGUMENT; }
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < i + 1; j++) {
+            if (!pendulum_finite(S[2 * i + j])) { return PENDULUM_NOT_FINITE; }
+        }
+    }
+
+    /* columns may change their sign: the diagonal is kept positive */
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < i + 1; j++) {
+            const float value = S[2 * i + j];
+            kf->S[i * (i + 1) / 2 + j] = S[2 * j + j] < 0.0f ? -value : value;
+        }
+    }
+    return PENDULUM_OK;
+}
+
+void pendulum_get_sqrt_covariance(const pendulum_t *kf, pendulum_real_t S[4])
+{
+    if (kf == NULL || S == NULL) { return; }
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < i + 1; j++) {
+            S[2 * i + j] = kf->S[i * (i + 1) / 2 + j];
+        }
+        for (int j = i + 1; j < 2; j++) {
+            S[2 * i + j] = 0.0f;
+        }
+    }
+}
