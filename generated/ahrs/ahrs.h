@@ -15,7 +15,7 @@
  * step: given at each step, clamped to at least 0.001 s, at most 0.1 s
  *
  * RAM 164 bytes a filter. Operations:
- *   predict       474 mul, 322 add, 48 div, 23 compare, 44 select
+ *   predict       504 mul, 322 add, 48 div, 23 compare, 44 select
  *   update_accel  339 mul, 243 add, 21 div, 5 compare
  *   update_mag    354 mul, 255 add, 21 div, 5 compare
  *
@@ -120,7 +120,7 @@ ahrs_status_t ahrs_init(ahrs_t *kf);
  * @param dt  time step [s]
  * @return AHRS_OK, AHRS_DT_CLAMPED, or an error that leaves *kf as it was
  *
- * 474 mul, 322 add, 48 div, 23 compare, 44 select.
+ * 504 mul, 322 add, 48 div, 23 compare, 44 select.
  */
 ahrs_status_t ahrs_predict(ahrs_t *kf, const ahrs_inputs_t *u, ahrs_real_t dt);
 

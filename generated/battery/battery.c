@@ -127,51 +127,60 @@ battery_status_t battery_update_terminal(battery_t *kf,
     const float t1 = 0.0004f + 0.01f * h_voltage_soc * h_voltage_soc;
 
     /* gain and covariance */
-    const float t2 = kf->D[0] * h_voltage_soc;
-    const float t3 = t1 + h_voltage_soc * t2;
-    const bool t4 = t3 > 1.1754944e-38f;
-    const float t5 = t4 ? 1.0f / t3 : 0.0f;
-    const float t6 = t2 * t5;
-    const float d_soc = kf->D[0] * (t4 ? t1 * t5 : 1.0f);
-    const float t7 = kf->U[0] * h_voltage_soc - 1.0f;
-    const float t8 = kf->D[1] * t7;
-    const float t9 = t3 + t7 * t8;
+    const float t2 = kf->U[0] * h_voltage_soc - 1.0f;
+    const float t3 = kf->U[1] * h_voltage_soc - kf->U[2] - 1.0f;
+    const float t4 = h_voltage_soc * (kf->D[0] * h_voltage_soc) + t2 * (kf->D[1] * t2)
+        + t3 * (kf->D[2] * t3);
+    const bool t5 = !(2.861023e-6f * (h_voltage_soc * h_voltage_soc
+        * (kf->D[0] + kf->U[0] * kf->D[1] * kf->U[0] + kf->U[1] * kf->D[2] * kf->U[1]) + kf->D[1]
+        + kf->U[2] * kf->D[2] * kf->U[2] + kf->D[2]) < t4) && t1 <= 0.0f && !(t4 < 0.0f);
+    const float t6 = t5 ? 0.0f : h_voltage_soc;
+    const float t7 = t5 ? 0.0f : -1.0f;
+    const float t8 = kf->D[0] * t6;
+    const float t9 = t1 + t6 * t8;
     const bool t10 = t9 > 1.1754944e-38f;
     const float t11 = t10 ? 1.0f / t9 : 0.0f;
     const float t12 = t8 * t11;
-    const float d_v_fast = kf->D[1] * (t10 ? t3 * t11 : 1.0f);
-    const float u_soc_v_fast = kf->U[0] - t7 * t6;
-    const float t13 = t6 + t12 * u_soc_v_fast;
-    const float t14 = kf->U[1] * h_voltage_soc - kf->U[2] - 1.0f;
-    const float t15 = kf->D[2] * t14;
-    const float s_voltage = t9 + t14 * t15;
-    const bool t16 = s_voltage > 1.1754944e-38f;
-    const float t17 = 1.0f / s_voltage;
-    const float t18 = t16 ? t17 : 0.0f;
-    const float t19 = t15 * t18;
-    const float d_v_slow = kf->D[2] * (t16 ? t9 * t18 : 1.0f);
-    const float u_v_fast_v_slow = kf->U[2] - t14 * t12;
-    const float u_soc_v_slow = kf->U[1] - t14 * t13;
-    const float nis = s_voltage > 0.0f ? y_voltage * (y_voltage * t17) : 0.0f;
+    const float d_soc = kf->D[0] * (t10 ? t1 * t11 : 1.0f);
+    const float t13 = kf->U[0] * t6 + t7;
+    const float t14 = kf->D[1] * t13;
+    const float t15 = t9 + t13 * t14;
+    const bool t16 = t15 > 1.1754944e-38f;
+    const float t17 = t16 ? 1.0f / t15 : 0.0f;
+    const float t18 = t14 * t17;
+    const float d_v_fast = kf->D[1] * (t16 ? t9 * t17 : 1.0f);
+    const float u_soc_v_fast = kf->U[0] - t13 * t12;
+    const float t19 = t12 + t18 * u_soc_v_fast;
+    const float t20 = kf->U[1] * t6 + kf->U[2] * t7 + t7;
+    const float t21 = kf->D[2] * t20;
+    const float s_voltage = t15 + t20 * t21;
+    const bool t22 = s_voltage > 1.1754944e-38f;
+    const float t23 = 1.0f / s_voltage;
+    const float t24 = t22 ? t23 : 0.0f;
+    const float t25 = t21 * t24;
+    const float d_v_slow = kf->D[2] * (t22 ? t15 * t24 : 1.0f);
+    const float u_v_fast_v_slow = kf->U[2] - t20 * t18;
+    const float u_soc_v_slow = kf->U[1] - t20 * t19;
+    const float nis = s_voltage > 0.0f ? y_voltage * (y_voltage * t23) : 0.0f;
 
     /* state and innovation squared */
-    const float soc_next = soc + (t13 + t19 * u_soc_v_slow) * y_voltage;
-    const float v_fast_next = v_fast + (t12 + t19 * u_v_fast_v_slow) * y_voltage;
-    const float v_slow_next = v_slow + t19 * y_voltage;
-    const float t20 = soc_next < 0.0f ? 0.0f : (soc_next > 1.0f ? 1.0f : soc_next);
+    const float soc_next = soc + (t19 + t25 * u_soc_v_slow) * y_voltage;
+    const float v_fast_next = v_fast + (t18 + t25 * u_v_fast_v_slow) * y_voltage;
+    const float v_slow_next = v_slow + t25 * y_voltage;
+    const float t26 = soc_next < 0.0f ? 0.0f : (soc_next > 1.0f ? 1.0f : soc_next);
 
     /* guards */
     if (!battery_finite(y_voltage + t1 + h_voltage_soc)) { return BATTERY_NOT_FINITE; }
     if (t1 < 0.0f) { /* a measurement variance is negative */
         return BATTERY_NOT_POSITIVE;
     }
-    if (!battery_finite(y_voltage + t20 + v_fast_next + v_slow_next + nis + soc_next)) {
+    if (!battery_finite(y_voltage + t26 + v_fast_next + v_slow_next + nis + soc_next)) {
         return BATTERY_NOT_FINITE;
     }
     if (s_voltage < 0.0f) { return BATTERY_NOT_POSITIVE; }
 
     /* store */
-    kf->x[BATTERY_SOC] = t20;
+    kf->x[BATTERY_SOC] = t26;
     kf->x[BATTERY_V_FAST] = v_fast_next;
     kf->x[BATTERY_V_SLOW] = v_slow_next;
     kf->U[0] = u_soc_v_fast;

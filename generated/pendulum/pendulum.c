@@ -194,22 +194,24 @@ pendulum_status_t pendulum_predict(pendulum_t *kf)
         const float t5 = 0.4f * dev_angle;
         const float t6 = d_angle + dev_angle * t5;
         const bool t7 = t6 > 0.0f;
-        const float t8 = dev_rate - dev_angle * u_rate_angle;
-        const float t4 = d_rate + t8 * (0.4f * (t7 ? d_angle / t6 : 1.0f) * t8);
-        u_rate_angle = u_rate_angle + (t7 ? t5 / t6 : 0.0f) * t8;
+        const float t8 = t7 ? d_angle / t6 : 1.0f;
+        const float t9 = dev_rate - dev_angle * u_rate_angle;
+        const float t4 = d_rate + t9 * (0.4f * t8 * t9);
+        u_rate_angle = t8 * u_rate_angle + (t7 ? t5 / t6 : 0.0f) * dev_rate;
         d_rate = t4;
         d_angle = t6;
     }
     const float mean_angle = 0.4f * shift_angle;
     const float mean_rate = 0.4f * shift_rate;
-    const float t9 = 0.7f * shift_angle;
-    const float t10 = d_angle + mean_angle * t9;
-    const bool t11 = t10 > 0.0f;
-    const float t12 = mean_rate - mean_angle * u_rate_angle;
-    const float t0 = d_rate + t12 * (1.75f * (t11 ? d_angle / t10 : 1.0f) * t12);
-    u_rate_angle = u_rate_angle + (t11 ? t9 / t10 : 0.0f) * t12;
+    const float t10 = 0.7f * shift_angle;
+    const float t11 = d_angle + mean_angle * t10;
+    const bool t12 = t11 > 0.0f;
+    const float t13 = t12 ? d_angle / t11 : 1.0f;
+    const float t14 = mean_rate - mean_angle * u_rate_angle;
+    const float t0 = d_rate + t14 * (1.75f * t13 * t14);
+    u_rate_angle = t13 * u_rate_angle + (t12 ? t10 / t11 : 0.0f) * mean_rate;
     d_rate = t0;
-    d_angle = t10;
+    d_angle = t11;
 
     /* roots */
     const float s_rate_rate = sqrtf(d_rate);
@@ -217,15 +219,15 @@ pendulum_status_t pendulum_predict(pendulum_t *kf)
     const float s_rate_angle = u_rate_angle * s_angle_angle;
     const float angle_next = angle_centre + mean_angle;
     const float rate_next = rate_centre + mean_rate;
-    const float t13 = pendulum_wrap(angle_next, 3.1415927f);
+    const float t15 = pendulum_wrap(angle_next, 3.1415927f);
 
     /* guards */
-    if (!pendulum_finite(t13 + rate_next + s_rate_rate + s_angle_angle)) {
+    if (!pendulum_finite(t15 + rate_next + s_rate_rate + s_angle_angle)) {
         return PENDULUM_NOT_FINITE;
     }
 
     /* store */
-    kf->x[PENDULUM_ANGLE] = t13;
+    kf->x[PENDULUM_ANGLE] = t15;
     kf->x[PENDULUM_RATE] = rate_next;
     kf->S[0] = s_angle_angle;
     kf->S[1] = s_rate_angle;

@@ -11,7 +11,7 @@
  * step: 0.02 s, compiled in
  *
  * RAM 28 bytes a filter. Operations:
- *   predict        231 mul, 296 add, 18 div, 2 sqrt, 9 compare, 18 select, 36 sin, 9 wrap
+ *   predict        240 mul, 296 add, 18 div, 2 sqrt, 9 compare, 18 select, 36 sin, 9 wrap
  *   update_camera  105 mul, 85 add, 8 div, 6 sqrt, 16 compare, 5 cos, 20 select, 5 sin, 1 wrap
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
@@ -85,7 +85,7 @@ pendulum_status_t pendulum_init(pendulum_t *kf);
  * @param kf  filter
  * @return PENDULUM_OK, or an error that leaves *kf as it was
  *
- * 231 mul, 296 add, 18 div, 2 sqrt, 9 compare, 18 select, 36 sin, 9 wrap.
+ * 240 mul, 296 add, 18 div, 2 sqrt, 9 compare, 18 select, 36 sin, 9 wrap.
  */
 pendulum_status_t pendulum_predict(pendulum_t *kf);
 

@@ -56,32 +56,32 @@ tracker_status_t tracker_predict(tracker_t *kf)
     /* process noise */
     const float d_vy = kf->D[3] + 0.01f;
     const float t5 = 1.0f / d_vy;
-    const float t6 = 0.1f * t5;
-    const float t7 = kf->D[3] * t5;
-    const float t8 = 0.1f * t3;
-    const float u_px_vy = t3 - t6 * t8;
-    const float u_vx_vy = kf->U[4] - t6 * t2;
-    const float t9 = 0.005f - 0.1f * t4;
-    const float u_py_vy = t4 + t6 * t9;
-    const float t10 = t7 * t9;
-    const float d_py = kf->D[2] + t9 * t10;
-    const bool t11 = d_py > 0.0f;
-    const float t12 = t11 ? t10 / d_py : 0.0f;
-    const float t13 = t7 * (t11 ? kf->D[2] / d_py : 1.0f);
-    const float t14 = t8 + t9 * t1;
-    const float u_px_py = t1 - t12 * t14;
-    const float t15 = t2 + t9 * kf->U[2];
-    const float u_vx_py = kf->U[2] - t12 * t15;
-    const float t16 = kf->D[1] + 0.01f;
-    const float t17 = 1.0f / t16;
-    const float t18 = t13 * t15;
-    const float d_vx = t16 + t15 * t18;
+    const float t6 = kf->D[3] * t5;
+    const float u_px_vy = t6 * t3;
+    const float t7 = 0.1f * t3;
+    const float u_vx_vy = t6 * kf->U[4];
+    const float u_py_vy = t6 * t4 + 0.0005f * t5;
+    const float t8 = 0.005f - 0.1f * t4;
+    const float t9 = t6 * t8;
+    const float d_py = kf->D[2] + t8 * t9;
+    const bool t10 = d_py > 0.0f;
+    const float t11 = t10 ? t9 / d_py : 0.0f;
+    const float t12 = t10 ? kf->D[2] / d_py : 1.0f;
+    const float t13 = t6 * t12;
+    const float u_px_py = t12 * t1 - t11 * t7;
+    const float u_vx_py = t12 * kf->U[2] - t11 * t2;
+    const float t14 = t2 + t8 * kf->U[2];
+    const float t15 = kf->D[1] + 0.01f;
+    const float t16 = 1.0f / t15;
+    const float t17 = kf->D[1] * t16;
+    const float t18 = t13 * t14;
+    const float d_vx = t15 + t14 * t18;
     const float t19 = 1.0f / d_vx;
-    const float t20 = 0.005f - 0.1f * t0;
-    const float t21 = t0 + 0.1f * t17 * t20;
-    const float t22 = t15 * t21 - t14;
-    const float u_px_vx = t21 - t18 * t19 * t22;
-    const float d_px = kf->D[0] + t20 * (kf->D[1] * t17 * t20) + t22 * (t13 * (t16 * t19) * t22);
+    const float t20 = t17 * t0 + 0.0005f * t16;
+    const float t21 = 0.005f - 0.1f * t0;
+    const float t22 = t14 * t20 - t7 - t8 * t1;
+    const float u_px_vx = t20 - t18 * t19 * t22;
+    const float d_px = kf->D[0] + t21 * (t17 * t21) + t22 * (t13 * (t15 * t19) * t22);
 
     /* guards */
     if (!tracker_finite(px_next + py_next + d_px + d_vx + d_py + d_vy)) {

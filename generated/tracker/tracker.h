@@ -14,7 +14,7 @@
  * step: 0.1 s, compiled in
  *
  * RAM 68 bytes a filter. Operations:
- *   predict            33 mul, 29 add, 5 div, 1 compare, 2 select
+ *   predict            35 mul, 27 add, 5 div, 1 compare, 2 select
  *   update_fix         108 mul, 70 add, 11 div, 2 abs, 14 compare, 2 log, 14 select
  *   update_fix_masked  129 mul, 70 add, 11 div, 2 sqrt, 2 abs, 14 compare, 2 log, 24 select
  *
@@ -92,7 +92,7 @@ tracker_status_t tracker_init(tracker_t *kf);
  * @param kf  filter
  * @return TRACKER_OK, or an error that leaves *kf as it was
  *
- * 33 mul, 29 add, 5 div, 1 compare, 2 select.
+ * 35 mul, 27 add, 5 div, 1 compare, 2 select.
  */
 tracker_status_t tracker_predict(tracker_t *kf);
 

@@ -15,7 +15,7 @@
  * step: given at each step, clamped to at least 0.001 s, at most 0.5 s
  *
  * RAM 112 bytes a filter. Operations:
- *   predict       85 mul, 71 add, 17 div, 10 compare, 1 cos, 18 select, 1 sin, 1 wrap
+ *   predict       94 mul, 62 add, 15 div, 10 compare, 1 cos, 16 select, 1 sin, 1 wrap
  *   update_gnss   95 mul, 70 add, 9 div, 15 compare, 20 select, 1 wrap
  *   update_speed  14 mul, 13 add, 1 div, 3 compare, 1 wrap
  *
@@ -116,7 +116,7 @@ vehicle_status_t vehicle_init(vehicle_t *kf);
  * @param dt  time step [s]
  * @return VEHICLE_OK, VEHICLE_DT_CLAMPED, or an error that leaves *kf as it was
  *
- * 85 mul, 71 add, 17 div, 10 compare, 1 cos, 18 select, 1 sin, 1 wrap.
+ * 94 mul, 62 add, 15 div, 10 compare, 1 cos, 16 select, 1 sin, 1 wrap.
  */
 vehicle_status_t vehicle_predict(vehicle_t *kf, const vehicle_inputs_t *u, vehicle_real_t dt);
 

@@ -81,30 +81,30 @@ vehicle_tutorial_status_t vehicle_tutorial_predict(vehicle_tutorial_t *kf)
     const float d_py = t15 + t5 * t20;
     const bool t21 = d_py > 0.0f;
     const float t22 = t21 ? t20 / d_py : 0.0f;
-    const float t23 = t8 * (t21 ? t15 / d_py : 1.0f);
-    const float t24 = t12 * t1;
-    const float t25 = t18 * t24 + t17 * t2;
-    const float t26 = t4 - t5 * t25;
-    const float u_px_py = t25 + t22 * t26;
+    const float t23 = t21 ? t15 / d_py : 1.0f;
+    const float t24 = t8 * t23;
+    const float t25 = t12 * t1;
+    const float t26 = t18 * t25 + t17 * t2;
+    const float u_px_py = t23 * t26 + t22 * t4;
     const float t27 = t18 * t12 + t17 * kf->U[2];
     const float t28 = kf->U[2] - t3 * t12;
+    const float u_v_py = t23 * t27 + t22 * kf->U[4];
     const float t29 = kf->U[4] - t5 * t27;
-    const float u_v_py = t27 + t22 * t29;
     const float t30 = 8.333333f + t13;
     const float t31 = 1.0f / t30;
     const float t32 = t19 * t28;
     const float t33 = t30 + t28 * t32;
     const float t34 = 1.0f / t33;
-    const float t35 = t23 * t29;
+    const float t35 = t24 * t29;
     const float d_v = t33 + t29 * t35;
     const float t36 = 1.0f / d_v;
     const float t37 = t13 * t31 * t1;
-    const float t38 = t2 - t3 * t24 - t28 * t37;
+    const float t38 = t2 - t3 * t25 - t28 * t37;
     const float t39 = t37 + t32 * t34 * t38;
-    const float t40 = t26 - t29 * t39;
+    const float t40 = t4 - t5 * t26 - t29 * t39;
     const float u_px_v = t39 + t35 * t36 * t40;
     const float d_px = kf->D[0] + t1 * (t13 * (8.333333f * t31) * t1)
-        + t38 * (t19 * (t30 * t34) * t38) + t40 * (t23 * (t33 * t36) * t40);
+        + t38 * (t19 * (t30 * t34) * t38) + t40 * (t24 * (t33 * t36) * t40);
 
     /* guards */
     if (!vehicle_tutorial_finite(px_next + py_next + d_px + d_v + d_py + d_th)) {

@@ -212,6 +212,8 @@ class Printer:
             case Call(callee=callee, args=args):
                 given = [self._argument(a) for a in args]
                 return _wrapped(f"{self.prefix}_{callee.name}({', '.join(given)});", depth)
+            case Flag(condition=condition, flag=flag) if condition.constant is not None:
+                return ["    " * depth + f"flags |= {self.prefix.upper()}_{flag};"]
             case Flag(condition=condition, flag=flag):
                 return _wrapped(f"if ({e(condition)}) {{ flags |= {self.prefix.upper()}_{flag}; }}", depth)
             case For(variable=v, start=start, stop=stop, body=inner, down=down):

@@ -171,7 +171,7 @@ class AdaptedQ:
         if self.kept.factored:
             U, D = self.kept.factors(t)
             D = [d * (1 - b) for d in D]
-            linalg.rank_one(U, D, [([t.value(x) for x in dx], t.value(b), -1) for dx in steps])
+            linalg.rank_one(U, D, [([t.value(x) for x in dx], t.value(b), -1) for dx in steps], safe=True)
             return assembled(U, D), (U, D)
         Q = self.kept.entries(t)
 

@@ -91,7 +91,7 @@ class Full:
         return linalg.dot(h, P.times(h))
 
     def inflated(self, P: Symmetric, a: Number) -> Symmetric:
-        return P.changed(lambda i, j, p: linalg.times(p, a))
+        return P.changed(lambda i, j, p: p * a)
 
     def _clamped(self, t: Trace, P: Symmetric, measurement: Measurement, K: Vector, c: Vector) -> Symmetric:
         """A variance that an exact measurement took to zero may come out below it by round-off: back to zero."""
@@ -143,7 +143,7 @@ class Full:
         for last, j in enumerate(self.sequence if after_predict else range(self.n)):
             for i in self.sequence[: last + 1] if after_predict else range(j + 1):
                 low, high = min(i, j), max(i, j)
-                t.store("kf.P", packed(low, high), t.name(P[low, high], f"p_{names[low]}_{names[high]}"))
+                t.store("kf.P", packed(low, high), t.name(t.value(P[low, high]), f"p_{names[low]}_{names[high]}"))
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
         return assembled(U, D)

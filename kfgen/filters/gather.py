@@ -122,7 +122,7 @@ class _Factors:
         U, D = Q.factors()
         for column, d in columns:
             assume_nonnegative(d)
-            linalg.rank_one(U, D, [(column, d, -1)])
+            linalg.rank_one(U, D, [(column, d, -1)], safe=True)
         self.sure = [is_positive(t.value(d)) for d in D]
         self.U: dict[tuple[int, int], Variable] = {
             (i, j): t.variable(f"u_{names[i]}_{names[j]}", t.value(U[i][j])) for j in range(n) for i in range(j)
@@ -146,7 +146,7 @@ class _Factors:
 
     def add(self, d: Vector, weight: Weight) -> None:
         U, D = self._read()
-        linalg.rank_one(U, D, [(d, self.t.value(weight), -1)])
+        linalg.rank_one(U, D, [(d, self.t.value(weight), -1)], safe=True)
         self._write(U, D)
 
     def subtract(self, d: Vector, weight: Weight) -> None:

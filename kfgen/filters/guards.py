@@ -16,7 +16,7 @@ def inputs(t: Trace, names: tuple[str, ...]) -> None:
 
 def finite(t: Trace, values: list[Value]) -> None:
     """NOT_FINITE by one test for all: a sum is finite only if its terms are."""
-    live = list({v.node: v for v in values if v.constant is None}.values())
+    live = list({v.node: v for v in map(t.value, values) if v.constant is None}.values())
     if live:
         t.guard(~t.finite(sum(live[1:], live[0])), "NOT_FINITE")
 

@@ -76,12 +76,13 @@ def unit_columns(F: Rows, U: Rows, k: int) -> Vector:
     return out
 
 
-def rank_one(U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]]) -> None:
+def rank_one(U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]], safe: bool = False) -> None:
     """U D U^T += sum of d w w^T over the columns (w, d, own), in place (Agee & Turner 1972; Bierman 1977, V.3).
 
     The columns take one pivot after another together, so that an element of U is fetched once for all of
     them. `own` is the pivot where a column carries most weight (-1: none): there U <- t U + b w is used for
-    U + b (w - s U), which loses digits where D is far below d s^2.
+    U + b (w - s U), which loses digits where D is far below d s^2; so it is where D may be as good as zero, and
+    everywhere if `safe`.
     """
     W = [list(w) for w, _, _ in columns]
     weights = [d for _, d, _ in columns]
@@ -89,8 +90,9 @@ def rank_one(U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]]) -> N
         steps = []
         for c, w in enumerate(W):
             if not is_zero(weights[c]) and not is_zero(w[j]):
+                careful = safe or columns[c][2] == j or not is_positive(D[j])
                 s, b, t, D[j], weights[c] = _pivot(D[j], w[j], weights[c])
-                steps.append((w, s, b, t, columns[c][2] == j))
+                steps.append((w, s, b, t, careful))
         for i in range(j):
             for w, s, b, t, own in steps:
                 U[i][j], w[i] = _element(U[i][j], w[i], s, b, t, own)

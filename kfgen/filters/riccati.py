@@ -52,6 +52,7 @@ class Gain:
     P: Exact
     made: list[Scalar]
     plain: list[Scalar]
+    floored: bool  # whether innovation_floor acts
 
 
 def steady(F: Exact, Q: Exact, sensors: Sequence[tuple[Exact, Exact]], rules: Rules) -> list[Gain] | None:
@@ -73,10 +74,13 @@ def steady(F: Exact, Q: Exact, sensors: Sequence[tuple[Exact, Exact]], rules: Ru
             return None
         after, closed, gains = P, mpmath.eye(A.rows), []
         for model in models:
-            plain = model.update(after, Rules())[2]
+            judged = Rules(floor=rules.floor)
+            plain = model.update(after, judged)[2]
+            floored = any(a.s != b.s for a, b in zip(plain, model.update(after, Rules())[2], strict=False))
+            floored = floored or len(plain) != len(model.update(after, Rules())[2])
             M, after, made = model.update(after, rules)
             closed = closed - M * model.H * closed
-            gains.append(Gain(_fractions(M), _fractions(after), made, plain))
+            gains.append(Gain(_fractions(M), _fractions(after), made, plain, floored))
         if not _settled(A * after * A.T + noise, P):
             return None
         loop = np.array((A * closed).tolist(), dtype=float)

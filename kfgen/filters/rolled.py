@@ -133,7 +133,7 @@ class Factors:
         self.absorb = absorb
         U, D = Q.factors()
         for w, d in columns:
-            linalg.rank_one(U, D, [(w, assume_nonnegative(d), -1)])
+            linalg.rank_one(U, D, [(w, assume_nonnegative(d), -1)], safe=True)
         self.U, self.D = t.array("factor", n * (n - 1) // 2), t.array("diagonal", n)
         self.w = t.array("w", n)
         for j in range(n):
@@ -179,9 +179,9 @@ def absorb(n: int, smallest: Fraction, taken: frozenset[str]) -> Function:
         with t.loop("i", 0, j) as i:
             place = triangle(j) + i
             u = t.name(t.element("factor", place), "u")
-            rest = t.name(t.element("w", i) - s * u, "rest")
-            t.store("w", i, rest)
-            t.store("factor", place, u + b * rest)
+            w = t.name(t.element("w", i), "w_i")
+            t.store("w", i, w - s * u)
+            t.store("factor", place, ratio * u + b * w)
         weight.set(weight.get() * ratio)
     arrays = [Argument(name, "{name}_real_t", pointer=True, constant=False, size=size)
               for name, size in (("factor", n * (n - 1) // 2), ("diagonal", n), ("w", n))]  # fmt: skip

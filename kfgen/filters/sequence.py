@@ -83,16 +83,21 @@ class Sequence:
         every_s: list[Value] = []
         failures: list[Value] = []
         steps: list[Vector] = []
-        group = 1 if self.singly else layout.group
+        prior = P  # what rounding leaves is relative to what it was
+        exact = [not is_positive(r) and _several(h) for h, r in zip(rows, variances, strict=True)]
+        singly = self.singly or any(exact)
+        group = 1 if singly else layout.group
         for first in range(0, len(rows), group):
             part = range(first, min(first + group, len(rows)))
             titles = ", ".join(self.names[c] for c in part)
             t.section("gain and covariance" + (f": {titles}" if len(rows) > 1 else ""))
-            below = [0 if is_positive(variances[c]) else layout.tolerance(P, rows[c]) for c in part]
+            below = [0 if is_positive(variances[c]) else layout.tolerance(prior, rows[c]) for c in part]
             measurements = [Measurement(rows[c], variances[c]) for c in part]
             nu: Any = None
-            if self.singly:
+            if singly:
                 nu = self._corrected(y, rows, moved, first)
+                if exact[first]:
+                    measurements = [self._unless_known(P, prior, measurements[0])]
                 used = None if innovation.used is None else innovation.used[first]
                 P, nu, measurement, failed = self._prepared(P, first, nu, measurements[0], used, below[0])
                 measurements = [measurement]
@@ -100,7 +105,7 @@ class Sequence:
             P, gains, s = layout.update(t, P, measurements)
             for c, K, variance, low in zip(part, gains, s, below, strict=True):
                 t.name(variance, f"s_{self.names[c]}")
-                if not self.singly:
+                if not singly:
                     nu = self._corrected(y, rows, moved, c)
                 step = [linalg.times(k, nu) for k in K]
                 steps.append(step)
@@ -119,7 +124,7 @@ class Sequence:
                     if innovation.used is not None:
                         term = t.select(innovation.used[c], term, 0)
                     likelihood = linalg.plus(likelihood, term)
-                every_s.append(variance)
+                every_s.append(t.value(variance))
         if self.plain:
             t.section("state and innovation squared")
             nis = t.name(nis, "nis")
@@ -165,10 +170,22 @@ class Sequence:
 
     def _uncertain(self, P: Covariance, h: Vector, spread: Value) -> Value:
         """Whether h P h^T is more than what rounding leaves of a direction that is known exactly."""
-        seen = [i for i, x in enumerate(h) if not is_zero(x)]
-        if len(seen) < 2:
+        if not _several(h):
             return self.t.wrapped(self.t.pool.boolean(True))
         dense = self.layout.entries(P)
-        terms = [h[i] * h[i] * dense[i, i] for i in seen]
+        terms = [x * x * dense[i, i] for i, x in enumerate(h) if not is_zero(x)]
         uncertain: Value = spread > sum(terms[1:], terms[0]) * (8 * self.layout.n * self.epsilon)
         return uncertain
+
+    def _unless_known(self, P: Covariance, prior: Covariance, measurement: Measurement) -> Measurement:
+        """The measurement, with h = 0 where it says exactly what is known exactly already: it is then skipped."""
+        h, t = measurement.h, self.t
+        spread = t.value(self.layout.variance(P, h))
+        lowest = -t.value(self.layout.tolerance(prior, h))
+        known = ~self._uncertain(prior, h, spread) & (t.value(measurement.r) <= 0) & ~(spread < lowest)
+        return Measurement([x if is_zero(x) else select(known, 0, x) for x in h], measurement.r)
+
+
+def _several(h: Vector) -> bool:
+    """Whether a row measures more than one state."""
+    return sum(1 for x in h if not is_zero(x)) > 1

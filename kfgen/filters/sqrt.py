@@ -77,11 +77,11 @@ class Sqrt:
         for _, d in noise:
             require_nonnegative(d, NEGATIVE)
         t.section("process noise")
-        linalg.rank_one(U, D, [(w, d, -1) for w, d in noise])
+        linalg.rank_one(U, D, [(w, d, -1) for w, d in noise], safe=True)
         t.section("F S S^T F^T + Q")
         for k in range(n):
             column_k: Vector = [linalg.dot(F[i][: k + 1], [P[j][k] for j in range(k + 1)]) for i in range(n)]
-            linalg.rank_one(U, D, [(column_k, t.one, k)])
+            linalg.rank_one(U, D, [(column_k, t.one, k)], safe=True)
         return self.from_factors(t, U, D)
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Rows:

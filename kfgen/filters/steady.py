@@ -105,6 +105,8 @@ class Steady:
             guards.finite(t, y)
             gate(t, model, sensor, nis, None)
         guards.finite(t, [nis, *free])
+        if gain.floored:
+            t.flag(t.wrapped(t.pool.boolean(True)), "REGULARIZED")
         t.section("store")
         for i, value in enumerate(x):
             if value.node is not prior[i].node:

@@ -63,7 +63,8 @@ class Symmetric:
         weighted = [times(g, k) for k in K]
         seen = [j for j, x in enumerate(h) if not is_zero(x)]
         # a state that is measured exactly is known exactly, not up to rounding
-        known = seen[0] if len(seen) == 1 and is_zero(r) and is_one(g) and not changed else -1
+        exact = len(seen) == 1 and is_constant(h[seen[0]]) and is_zero(r) and is_one(g) and not changed
+        known = seen[0] if exact else -1
 
         def partial(i: int, j: int) -> Number:
             return self[i, j] if is_zero(K[i]) or is_zero(c[j]) else self[i, j] - weighted[i] * c[j]

@@ -63,8 +63,7 @@ class Bank(Estimator):
         w, c = mixing(self._rows(bank, context), bank.mu)
         mixed = [self._mixed(bank, j, w[:, j]) if c[j] > 0.0 else bank.modes[j] for j in range(len(c))]
         steps = _each(
-            partial(algorithm.predict, start, context)
-            for algorithm, start in zip(self.algorithms, mixed, strict=True)
+            partial(algorithm.predict, start, context) for algorithm, start in zip(self.algorithms, mixed, strict=True)
         )
         flags = _joined(warnings for _, warnings in steps)
         return self._stored(c / np.sum(c), [after for after, _ in steps]), flags

@@ -26,15 +26,16 @@ def moments(model: Model, estimates: Sequence[Estimate], weights: Vector) -> tup
     """
     base = estimates[int(np.argmax(weights))].x
     part = [i for i, weight in enumerate(weights) if weight > 0.0]
-    differences = [estimates[i].x - base for i in part]
-    for difference in differences:
-        for k, period in model.periods.items():
-            difference[k] = wrap(float(difference[k]), period)
-    shift = np.sum([weights[i] * difference for i, difference in zip(part, differences, strict=True)], axis=0)
-    P = np.zeros((model.n, model.n))
-    for i, difference in zip(part, differences, strict=True):
-        d = difference - shift
-        P += weights[i] * (estimates[i].P + np.outer(d, d))
+    with np.errstate(all="ignore"):
+        differences = [estimates[i].x - base for i in part]
+        for difference in differences:
+            for k, period in model.periods.items():
+                difference[k] = wrap(float(difference[k]), period)
+        shift = np.sum([weights[i] * difference for i, difference in zip(part, differences, strict=True)], axis=0)
+        P = np.zeros((model.n, model.n))
+        for i, difference in zip(part, differences, strict=True):
+            d = difference - shift
+            P += weights[i] * (estimates[i].P + np.outer(d, d))
     return model.wrap(base + shift), P
 
 
