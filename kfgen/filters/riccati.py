@@ -8,7 +8,6 @@ from fractions import Fraction
 from typing import Any
 
 import mpmath
-import numpy as np
 
 from kfgen.filters import linalg
 from kfgen.ir.constants import DIGITS, to_fraction, to_mpf
@@ -83,6 +82,8 @@ def steady(F: Exact, Q: Exact, sensors: Sequence[tuple[Exact, Exact]], rules: Ru
             gains.append(Gain(_fractions(M), _fractions(after), made, plain, floored))
         if not _settled(A * after * A.T + noise, P):
             return None
+        import numpy as np  # here: a cold build of another filter does without it
+
         loop = np.array((A * closed).tolist(), dtype=float)
         return gains if max(abs(np.linalg.eigvals(loop))) < _STABLE else None
 

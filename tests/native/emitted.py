@@ -54,8 +54,6 @@ def _problems() -> ModuleType:
 
 
 problems = _problems()
-# partial and reset_after stand in the problem for the reference's sake
-NOISE_INPUTS = problems.NOISE_INPUTS.replace("    partial: true\n", "").replace(", reset_after: 3", "")
 
 SWITCHES = """
 kfgen: 1
@@ -237,7 +235,7 @@ EXACT = {
 LARGE = {name: problems.ALL[name] for name in ("chain8", "att")}  # exact as well
 LIBM = {
     **{name: problems.ALL[name] for name in ("vehicle4", "radar")},
-    "noise_inputs": NOISE_INPUTS, "functions": FUNCTIONS,
+    "noise_inputs": problems.NOISE_INPUTS, "functions": FUNCTIONS,
 }  # fmt: skip
 CHAIN16 = {"chain16": problems.ALL["chain16"]}
 GROUPS = {"exact": EXACT, "large": LARGE, "libm": LIBM, "chain16": CHAIN16}
@@ -330,15 +328,17 @@ class Program:
         self.run("init")
 
     def run(self, function: str, **arguments: Any) -> int:
-        """A function with its u, z, dt, x or P; its status."""
+        """A function with its u, z, mask, dt, x or P; its status."""
         names = {"u": [i.name for i in self.spec.inputs]}
         for sensor in self.spec.measurements:
-            if function == f"update_{sensor.name}":
+            if function in (f"update_{sensor.name}", f"update_{sensor.name}_masked"):
                 names["z"] = [component.name for component in sensor.components]
         for key, value in arguments.items():
             if key in names:
                 for name, each in zip(names[key], value, strict=True):
                     self.memory.numbers[f"{key}.{name}"] = self.number(each)
+            elif key == "mask":
+                self.memory.numbers[key] = int(value)
             elif np.ndim(value):
                 self.memory.arrays[key] = [self.number(each) for each in np.ravel(value)]
             else:

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from problems import ALL, CV4, IMM3, NOISE_INPUTS, RADAR, one_state
+from problems import ALL, CV4, NOISE_INPUTS, RADAR, one_state
 from scipy.stats import chi2
 
 import kfgen.reference
-from kfgen.errors import SpecError
 from kfgen.reference import Status, reference
 from kfgen.reference.model import Context, wrap
 from kfgen.spec import loads
@@ -223,18 +222,6 @@ def test_problems_run_and_stay_consistent(name):
             assert kf.update(sensor.name, z, u) == 0
         assert np.array_equal(kf.P, kf.P.T)
         assert np.min(np.linalg.eigvalsh(kf.P)) > -1e-12 * np.max(kf.P)
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        (IMM3, "imm"),
-    ],
-)
-def test_what_is_not_built_yet_says_so(text, named):
-    spec = loads(text)
-    with pytest.raises(SpecError, match=f"{named}.* is not built yet"):
-        reference(spec)
 
 
 def test_the_oracle_shares_nothing_with_the_generator():
