@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cache
 
 import mpmath
 
@@ -15,6 +16,7 @@ def log_two_pi() -> Fraction:
         return to_fraction(mpmath.log(2 * mpmath.pi))
 
 
+@cache
 def chi2_quantile(probability: Fraction, degrees: int) -> Fraction:
     """x with P(chi-square of `degrees` degrees of freedom <= x) = probability, 0 < probability < 1.
 

@@ -785,7 +785,7 @@ ahrs_status_t ahrs_update_accel(ahrs_t *kf, const ahrs_accel_t *z)
     if (t208 && kf->gate_count_accel < 50) {
         kf->nis = nis;
         kf->gate_count_accel = kf->gate_count_accel + 1;
-        return flags | AHRS_GATED;
+        return AHRS_GATED;
     }
     if (t208) { flags |= AHRS_ANOMALY; }
     if (!ahrs_finite(nis + q0_next + q1_next + q2_next + q3_next + bx_next + by_next + bz_next)) {
@@ -1137,7 +1137,7 @@ ahrs_status_t ahrs_update_mag(ahrs_t *kf, const ahrs_mag_t *z)
     if (t218 && kf->gate_count_mag < 50) {
         kf->nis = nis;
         kf->gate_count_mag = kf->gate_count_mag + 1;
-        return flags | AHRS_GATED;
+        return AHRS_GATED;
     }
     if (t218) { flags |= AHRS_ANOMALY; }
     if (!ahrs_finite(nis + q0_next + q1_next + q2_next + q3_next + bx_next + by_next + bz_next)) {

@@ -337,7 +337,7 @@ vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z)
     if (t71 && kf->gate_count_gnss < 10) {
         kf->nis = nis;
         kf->gate_count_gnss = kf->gate_count_gnss + 1;
-        return flags | VEHICLE_GATED;
+        return VEHICLE_GATED;
     }
     if (t71) { flags |= VEHICLE_ANOMALY; }
     if (!vehicle_finite(nis + x_next + y_next + t70 + speed_next + gyro_bias_next)) {
@@ -417,7 +417,7 @@ vehicle_status_t vehicle_update_speed(vehicle_t *kf, const vehicle_speed_t *z)
     if (t3 && kf->gate_count_speed < 10) {
         kf->nis = nis;
         kf->gate_count_speed = kf->gate_count_speed + 1;
-        return flags | VEHICLE_GATED;
+        return VEHICLE_GATED;
     }
     if (t3) { flags |= VEHICLE_ANOMALY; }
     if (!vehicle_finite(nis + x_next + y_next + t2 + speed_next + gyro_bias_next)) {

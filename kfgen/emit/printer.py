@@ -200,8 +200,6 @@ class Printer:
                 return _wrapped(_assignment(target, e(node)), depth)
             case Guard(condition=condition, status=status, before=before, why=why):
                 returned = f"{self.prefix.upper()}_{status}"
-                if self.has_flags and status == "GATED":
-                    returned = f"flags | {returned}"
                 body = [line for store in before for line in self._statement(store, depth + 1)]
                 body += ["    " * (depth + 1) + f"return {returned};"]
                 head = _wrapped(f"if ({e(condition)}) {{" + (f" /* {why} */" if why else ""), depth)

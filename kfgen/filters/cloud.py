@@ -45,7 +45,7 @@ class Private:
         return out
 
 
-def _given(model: Model, used: set[str], step: bool) -> tuple[list[Argument], list[str]]:
+def given_for(model: Model, used: set[str], step: bool) -> tuple[list[Argument], list[str]]:
     arguments: list[Argument] = []
     if used & {name for name, _ in model.parameters} or "t" in used:
         arguments.append(CONST_KF)
@@ -90,7 +90,7 @@ def dynamics(model: Model, carried: tuple[str, ...], taken: frozenset[str]) -> P
     """x <- f(x, u, w) in place, x (n + q) with the carried noises behind the states."""
     t, n = Trace(), len(model.states)
     used = model.uses(*model.f)
-    arguments, given = _given(model, used, model.spec.dt is not None)
+    arguments, given = given_for(model, used, model.spec.dt is not None)
     noises = {w.name: t.zero for w in model.noises}
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("x", n + k), name)
@@ -113,7 +113,7 @@ def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], tak
     """z = h(x, e), x (n + q) with the carried noises behind the states."""
     t, n = Trace(), len(model.states)
     used = model.uses(*sensor.h)
-    arguments, given = _given(model, used, False)
+    arguments, given = given_for(model, used, False)
     noises = {w.name: t.zero for w in sensor.noises}
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("x", n + k), name)
@@ -153,12 +153,18 @@ def weights(t: Trace, values: list[Fraction], k: Value, name: str) -> Value:
     return t.constants(tuple(values), k, name)
 
 
+def residual_uses(model: Model, sensor: SensorModel) -> set[str]:
+    """Names that own residuals of the sensor use."""
+    return model.uses(*(r for r in sensor.residual if r is not None))
+
+
 def difference(t: Trace, model: Model, sensor: SensorModel, i: int, z: Value, base: Value, x: list[Value]) -> Value:
     """z - base of component i, wrapped, or by its own residual at x."""
+    used = residual_uses(model, sensor)
     residual, period = sensor.residual[i], sensor.periods[i]
     if residual is not None:
         name = sensor.spec.components[i].name
-        evaluator = Evaluator(t, model, _duals(t, model, x, {w.name: t.zero for w in sensor.noises}, set()))
+        evaluator = Evaluator(t, model, _duals(t, model, x, {w.name: t.zero for w in sensor.noises}, used))
         evaluator.bind(sympy.Symbol(f"z_{name}"), z)
         evaluator.bind(sympy.Symbol(f"h_{name}"), base)
         return evaluator.value(residual)
@@ -178,6 +184,25 @@ def depends(value: Value, prefixes: tuple[str, ...]) -> bool:
             return True
         stack.extend(node.args)
     return False
+
+
+def bends(values: list[Value], gradients: list[Value]) -> bool:
+    """Whether some function of kf.x is not affine: a derivative depends on it, or something jumps with it."""
+    if any(depends(g, ("kf.x",)) for g in gradients):
+        return True
+    stack, seen = [v.node for v in values], set()
+    while stack:
+        node = stack.pop()
+        if node.serial in seen:
+            continue
+        seen.add(node.serial)
+        if node.op in _JUMPS and depends(Value(values[0].trace, node), ("kf.x",)):
+            return True
+        stack.extend(node.args)
+    return False
+
+
+_JUMPS = ("lt", "le", "sign", "floor", "ceil", "segment", "wrap")
 
 
 def carried_by(model: Model, duals: list[Dual], names: list[str], covariance: tuple[tuple[object, ...], ...],

@@ -6,7 +6,7 @@ update: see `sequence`. The filters that linearise otherwise are subclasses: iek
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from kfgen.filters import guards, process
@@ -50,6 +50,7 @@ class Update:
     layout: Layout
     used: list[Value] | None
     adapted: AdaptedR | None
+    tested: list[Value] = field(default_factory=list)  # what else has to be finite
 
     @cached_property
     def P(self) -> Covariance:
@@ -211,15 +212,15 @@ class Ekf:
         result = self.sequence(u, innovation, plain=True)
         final = self.final(u, innovation, result)
         x = self.moved(u, final.moved)
-        evidence = self.unconfined(x) + self.layout.evidence(final.P, after_predict=False)
+        evidence = self.unconfined(x) + self.layout.evidence(final.P, after_predict=final is not result)
         P = self.limited(t, final.P)
         x = self.state.confined(t, x)
         t.section("guards")
         if final is result and sensor.gate is None:
-            guards.doubts(t, self._model_values(innovation))
+            guards.doubts(t, [*self._model_values(innovation), *u.tested])
             # nis shows whether z is finite, but for components that may have been skipped
             skippable = [v for v, r in zip(innovation.y, innovation.variances, strict=True) if not is_positive(r)]
-            guards.finite(t, [*skippable, *x, result.nis, *evidence])
+            guards.finite(t, [*skippable, *x, result.nis, *evidence, *u.tested])
             guards.positive(t, result.failures)
         elif final is result:
             self.judged(u, innovation, result)
@@ -268,7 +269,10 @@ class Ekf:
         if u.adapted is not None or linear.computed:
             smallest = len(R) * self.scalar.epsilon
         if u.used is not None:
+            own = masked(u.t, linear, linear.R, u.used)[1]
             linear, R = masked(u.t, linear, R, u.used)
+            if linear.computed and any(r.constant is None for row in linear.R for r in row):
+                Given(own).factors()  # what was added might hide that R is no covariance
         innovation = decorrelated(u.t, linear, R, u.used, smallest)
         for r in innovation.variances:
             require_nonnegative(r, "a measurement variance is negative")
@@ -300,8 +304,8 @@ class Ekf:
         """Guards and gate over the textbook's update. A far outlier may overflow nis and is gated all the same."""
         t = u.t
         t.section("guards")
-        guards.doubts(t, self._model_values(innovation))
-        guards.finite(t, [*innovation.y, *plain.s])
+        guards.doubts(t, [*self._model_values(innovation), *u.tested])
+        guards.finite(t, [*innovation.y, *plain.s, *u.tested])
         guards.positive(t, plain.failures)
         gate(t, self.model, u.sensor, plain.nis, u.used)
 

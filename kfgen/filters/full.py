@@ -163,7 +163,7 @@ class Full:
         low = {i: after[i, i] < 0 for i in range(self.n) if not is_zero(c[i])}
         failed: Value = t.wrapped(t.pool.boolean(False))
         for i, negative in low.items():
-            failed = failed | (after[i, i] < -(P[i, i] * tolerance))
+            failed = failed | (after[i, i] < -(P[i, i] * (1024 * tolerance)))  # the points' rounding is in c
             t.flag(negative, "REGULARIZED")
         return after.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p), failed
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Protocol
 
-from kfgen.filters import linalg
+from kfgen.filters import guards, linalg
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector
 from kfgen.filters.noise import Additive
@@ -129,6 +129,7 @@ class _Factors:
         }
         self.D = [t.variable(f"d_{name}", t.value(d)) for name, d in zip(names, D, strict=True)]
         self.failures: list[Value] = []
+        self.depth = t.depth
 
     def _read(self) -> tuple[Rows, Vector]:
         n = self.n
@@ -153,7 +154,11 @@ class _Factors:
         U, D = self._read()
         failed, gone = linalg.downdate(U, D, d, 1 / self.t.value(weight), 8 * self.n * self.epsilon)
         self.t.flag(gone, "REGULARIZED")
-        self.failures.append(failed)
+        if self.t.depth == self.depth:
+            self.failures.append(failed)
+        else:  # in a loop: nothing has been stored yet
+            guards.finite(self.t, d)
+            self.t.guard(failed, "NOT_POSITIVE")
         self.sure = [False] * self.n
         self._write(U, D)
 

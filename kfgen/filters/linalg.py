@@ -180,22 +180,26 @@ def bierman(U: Rows, D: Vector, measurements: list[Measurement]) -> tuple[Rows, 
     return K, s
 
 
-def downdate(U: Rows, D: Vector, c: Vector, s: Number, tolerance: Number) -> tuple[Number, Number]:
+def downdate(
+    U: Rows, D: Vector, c: Vector, s: Number, tolerance: Number, smallest: Vector | None = None
+) -> tuple[Number, Number]:
     """U D U^T -= c c^T / s, s > 0, in place: Bierman's update for an h with P h^T = c and r = s - h P h^T.
 
-    Returns the condition of failure, that the result is not positive semidefinite, and whether r was nothing but
-    rounding (up to `tolerance` of s) and was taken as 0.
+    Returns the condition of failure, that the result is not positive semidefinite by more than `tolerance` of s, and
+    whether r came out negative by less and was taken as 0. A pivot that is not above `smallest` is a direction
+    without spread: what c has there is round-off.
     """
     n = len(D)
     v: Vector = list(c)  # U^-1 c = D f
     for j in reversed(range(n)):
         for i in range(j):
             v[i] = minus(v[i], times(U[i][j], v[j]))
+    if smallest is not None:
+        v = [select(d > low, x, 0) for x, d, low in zip(v, D, smallest, strict=True)]
     f = [times(x, 1 / d if is_positive(d) else reciprocal(d)[1]) for x, d in zip(v, D, strict=True)]
     r = s - dot(f, v)
-    limit = s * tolerance
-    failed = ~(r >= -limit)
-    gone = r <= limit
+    failed = ~(r >= -(s * tolerance))
+    gone = r < 0
     before = assume_nonnegative(select(gone, 0, r))
     k: Vector = [0] * n
     for j in range(n):

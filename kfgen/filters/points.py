@@ -43,6 +43,11 @@ class PointSet:
         return len(set(self.wm)) == 1 and len(set(self.wc)) == 1
 
     @property
+    def balanced(self) -> bool:
+        """Whether all weigh the same and lie evenly about the mean."""
+        return self.uniform and not any(sum(column, Fraction(0)) for column in zip(*self.rows, strict=True))
+
+    @property
     def positive(self) -> bool:
         """Whether whatever is gathered is positive semidefinite."""
         return self.extra >= 0 and all(w >= 0 for w in self.wc)

@@ -15,7 +15,7 @@ from kfgen.ir.constants import DIGITS, to_fraction, to_mpf
 Exact = list[list[Fraction]]
 
 _DOUBLINGS = 60
-_PREDICTIONS = 5000  # where doubling does not apply
+_PREDICTIONS = 1000  # where doubling does not apply
 _SETTLED = Fraction(1, 10**30)
 _STABLE = 1 - 1e-9  # the largest eigenvalue of F (I - K H) of a filter that forgets its start
 _SMALLEST = Fraction(1, 10**10)  # a covariance below it settles absolutely, not relative to itself

@@ -164,7 +164,8 @@ class Sequence:
                 low = low & used
             if not is_positive(r):
                 failed.append(spread + r < -below)
-            t.flag(low, "REGULARIZED")
+            if not (self.plain and departs(self.model)):  # that one is judged, not made
+                t.flag(low, "REGULARIZED")
             r = assume_positive(select(low, floor - spread, r))
         return P, nu, Measurement(h, r, g), failed
 

@@ -179,7 +179,11 @@ class UD:
     def downdated(self, t: Trace, P: tuple[Rows, Vector], c: Vector, s: Number, tolerance: Fraction, sure: bool
                   ) -> tuple[tuple[Rows, Vector], Value]:  # fmt: skip
         U, D = [list(row) for row in P[0]], list(P[1])
-        failed, gone = linalg.downdate(U, D, c, s, tolerance)
+        smallest = None
+        if not sure:
+            dense = self.entries(P)
+            smallest = [dense[j, j] * tolerance for j in range(self.n)]
+        failed, gone = linalg.downdate(U, D, c, s, 1024 * tolerance, smallest)  # the points' rounding is in c
         t.flag(gone, "REGULARIZED")
         return (U, D), failed
 

@@ -16,8 +16,8 @@ from kfgen.filters.ekf import Ekf, Update
 from kfgen.filters.gather import Gatherer, cholesky, gatherer, root_of_factors
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.noise import Given
-from kfgen.filters.numbers import is_zero
+from kfgen.filters.noise import NEGATIVE, Given
+from kfgen.filters.numbers import is_constant, is_zero, require_nonnegative, select
 from kfgen.filters.points import PointSet, point_set
 from kfgen.filters.process import Step
 from kfgen.filters.sensor import Linearised
@@ -63,7 +63,7 @@ class Ukf(Ekf):
         t = Trace()
         step = process.step_length(t, model)
         result = process.advance(t, model, process.given(t, model, step), step)
-        return not any(cloud.depends(v, ("kf.x",)) for row in result.F for v in row)
+        return not cloud.bends(result.x, [v for row in result.F for v in row])
 
     def extra_blocks(self) -> list[Block]:
         if not self.keeps:
@@ -134,7 +134,7 @@ class Ukf(Ekf):
         result = process.advance(t, model, prior, step, carried=self.carried)
         P0 = self.layout.load(t)
         t.section("sigma points")
-        noise = self._noise_root(t, prior.duals)
+        noise, tested = self._noise_root(t, prior.duals)
         stride = self.n + len(self.carried)
         array = t.array("points", len(self.set.rows) * stride)
         failures = self.scatter(t, P0, noise, self.set, array)
@@ -150,7 +150,7 @@ class Ukf(Ekf):
         x = self.state.confined(t, x)
         t.section("guards")
         doubtful = [v for row in result.Q for v in row] + [d for _, d in result.noise]
-        guards.finite(t, [*x, *evidence])
+        guards.finite(t, [*x, *evidence, *tested])
         guards.doubts(t, doubtful)
         guards.positive(t, failures)
         self.store(t, x, set(range(self.n)), P, after_predict=True)
@@ -194,7 +194,7 @@ class Ukf(Ekf):
             out.append([*[0] * self.n, *[noise[i][j] for i in range(q)]])
         return [[v if isinstance(v, Value) else t.value(v) for v in column] for column in out], failures
 
-    def _noise_root(self, t: Trace, duals: dict[str, Dual]) -> Rows:
+    def _noise_root(self, t: Trace, duals: dict[str, Dual]) -> tuple[Rows, list[Value]]:
         evaluator = Evaluator(t, self.model, duals)
         names = [w.name for w in self.model.noises]
         index = [names.index(w) for w in self.carried]
@@ -208,12 +208,10 @@ class Ukf(Ekf):
         model, n, points, f = self.model, self.n, self.set, self.f
         assert f is not None
         count = len(points.rows)
-        base_array = t.array("centre", stride)
-        for i in range(stride):
-            base_array[i] = x[i] if i < n else t.zero
-        bent = [p is not None for p in model.periods]
-        middle = points.centre or any(bent)
-        if middle:
+        if points.centre or any(p is not None for p in model.periods):
+            base_array = t.array("centre", stride)
+            for i in range(stride):
+                base_array[i] = x[i] if i < n else t.zero
             t.call(f.function, [*f.arguments(step.dt), ("centre", 0)])
             base = [t.name(cloud.clipped(t, base_array[i], model.bounds[i]), f"{model.states[i]}_centre")
                     for i in range(n)]  # fmt: skip
@@ -368,15 +366,20 @@ class Ukf(Ekf):
         return seeing.residual(self, u, x, P)
 
 
-def noise_root(C: Rows, form: str, tolerance: Fraction) -> Rows:
-    """A root of the covariance of noise inputs (q, q), of the kind that the form of the covariance has."""
+def noise_root(C: Rows, form: str, tolerance: Fraction) -> tuple[Rows, list[Value]]:
+    """A root of the covariance of noise inputs (q, q), of the kind that the form of the covariance has; and what of C
+    has to be tested to be finite. That C is a covariance is left to a guard."""
+    values = [v for row in C for v in row if v.constant is None]
     if not C:
-        return []
+        return [], values
+    U, D = linalg.udu(C)
+    for d in D:
+        require_nonnegative(d, NEGATIVE)
     if form == "ud":
-        return root_of_factors(*linalg.udu(C))
-    q = len(C)
-    S, _ = cholesky(lambda i, j: C[i][j], q, tolerance)
-    return S
+        D = [d if is_constant(d) else select(d > 0, d, 0) for d in D]
+        return root_of_factors(U, D), values
+    S, _ = cholesky(lambda i, j: C[i][j], len(C), tolerance)
+    return S, values
 
 
 def _carried_by_process(model: Model) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from kfgen.filters import cloud, guards, linalg
-from kfgen.filters.base import CONST_KF
 from kfgen.filters.cloud import Private
 from kfgen.filters.ekf import Update
 from kfgen.filters.gate import chi2_threshold, gate
@@ -73,7 +72,7 @@ class Seeing:
         self.tolerance = tolerance
         self.n, self.m, self.q = len(model.states), len(sensor.h), len(carried)
         self.stride = self.n + self.q
-        self.symmetric = not recalls and points.uniform
+        self.symmetric = not recalls and points.balanced
         self.linear = self._is_linear()
         self.h: Private | None = None
         self.see: Private | None = None
@@ -88,8 +87,8 @@ class Seeing:
             return False
         t = Trace()
         code = SensorCode(t, model, sensor, list(range(self.n)))
-        H = code.linearise(code.prior()).H
-        return not any(cloud.depends(v, ("kf.x",)) for row in H for v in row)
+        linear = code.linearise(code.prior())
+        return not cloud.bends([p.value for p in linear.predicted], [v for row in linear.H for v in row])
 
     @property
     def size(self) -> int:
@@ -121,12 +120,8 @@ class Seeing:
         x = [t.name(t.element("x", i), name) for i, name in enumerate(model.states)]
         point, z = t.array("point", self.stride), t.array("z", m)
         store = None if points.theta == 0 else t.array("dz", len(points.rows) * m)
-        arguments = list(self.h.function.arguments[:-2])
-        given = list(self.h.given)
-        used = model.uses(*(r for r in sensor.residual if r is not None))
-        if used & {name for name, _ in model.parameters} and "kf" not in given:
-            arguments.insert(0, CONST_KF)
-            given.insert(0, "kf")
+        used = model.uses(*sensor.h) | cloud.residual_uses(model, sensor)
+        arguments, given = cloud.given_for(model, used, False)
         call = self.h.arguments(None)
         middle = [t.element("middle", i) if self.recalls and points.centre else t.zero for i in range(n)]
         for i in range(self.stride):
@@ -243,7 +238,9 @@ class Seeing:
         from kfgen.filters.ukf import noise_root
 
         C = self.noise_covariance(u)
-        return noise_root(C, self.model.spec.filter.covariance, self.tolerance)
+        root, tested = noise_root(C, self.model.spec.filter.covariance, self.tolerance)
+        u.tested += tested
+        return root
 
     def noise_covariance(self, u: Update) -> Rows:
         """Of the carried noises."""
@@ -287,12 +284,15 @@ class Seeing:
         seen = self.read(t, self.look(ukf, u)[0])
         U, D = u.P
         H = []
+        dense = u.layout.entries(u.P)
+        known = [dense[j, j] * self.tolerance for j in range(self.n)]  # a pivot up to it is a direction without spread
         for a in range(self.m):
-            H.append(_solved(U, D, [seen.cross[i][a] for i in range(self.n)]))
+            H.append(_solved(U, D, [seen.cross[i][a] for i in range(self.n)], known))
         linear = replace(u.code.linearise(u.x), y=u.code.residuals(u.x, seen.z), H=H)
         if self.carried:
             V, C = linalg.udu(self.noise_covariance(u))
-            rows = [_solved(V, C, [seen.noise[i][a] for i in range(self.q)]) for a in range(self.m)]
+            none: Vector = [t.zero] * self.q
+            rows = [_solved(V, C, [seen.noise[i][a] for i in range(self.q)], none) for a in range(self.m)]
             share = [[t.value(linalg.dot(rows[a], [seen.noise[i][b] for i in range(self.q)])) for b in range(self.m)]
                      for a in range(self.m)]  # fmt: skip
             added = [[p + q for p, q in zip(r, s, strict=True)] for r, s in zip(linear.added, share, strict=True)]
@@ -300,14 +300,18 @@ class Seeing:
         return linear, seen.spread
 
 
-def _solved(U: Rows, D: Vector, c: Vector) -> Vector:
-    """(U D U^T)^-1 c, where D is 0 with entries 0."""
+def _solved(U: Rows, D: Vector, c: Vector, smallest: Vector) -> Vector:
+    """(U D U^T)^-1 c; an entry is 0 where D is not above `smallest`."""
     n = len(D)
     v: Vector = list(c)
     for j in reversed(range(n)):
         for i in range(j):
             v[i] = linalg.minus(v[i], times(U[i][j], v[j]))
-    v = [times(x, 1 / d if is_positive(d) else reciprocal(assume_nonnegative(d))[1]) for x, d in zip(v, D, strict=True)]
+    inverse = []
+    for d, low in zip(D, smallest, strict=True):
+        some, reciprocal_d = reciprocal(assume_nonnegative(d))
+        inverse.append(reciprocal_d if is_zero(low) else select(some & (d > low), 1 / d, 0))
+    v = [times(x, r) for x, r in zip(v, inverse, strict=True)]
     for j in range(n):
         for i in range(j):
             v[j] = linalg.minus(v[j], times(U[i][j], v[i]))
@@ -327,8 +331,11 @@ class Factored:
     nis: Value
 
 
-def factored(t: Trace, names: list[str], y: Vector, S: Rows, cross: Rows, sure: bool, tolerance: Fraction) -> Factored:
-    """sure: every pivot is known to be positive, but for what a guard finds."""
+def factored(
+    t: Trace, names: list[str], y: Vector, S: Rows, cross: Rows, sure: bool, tolerance: Fraction, noise: Vector
+) -> Factored:
+    """sure: every pivot is known to be positive, but for what a guard finds. noise: what rounding may leave of each
+    variance (m,)."""
     m, n = len(y), len(cross)
     rest = [list(row) for row in S]
     nu = list(y)
@@ -346,7 +353,7 @@ def factored(t: Trace, names: list[str], y: Vector, S: Rows, cross: Rows, sure: 
             inverse.append(1 / assume_positive(pivot))
             D.append(pivot)
         else:
-            limit = S[j][j] * (tolerance * m)
+            limit = S[j][j] * (tolerance * m) + noise[j]
             failures.append(~(pivot >= -limit))
             counts = (pivot > limit) & (pivot > 0)
             inverse.append(select(counts, 1 / pivot, 0))
@@ -381,10 +388,11 @@ def whole_vector(ukf: Ukf, seeing: Seeing, taken: frozenset[str], partial: bool)
     linear = code.linearise(u.x)
     work = _Whole(ukf, u, seeing, linear, seen)
     t.section("its covariance S = L D L^T")
-    first = work.factored(seen)
+    first = work.factored(seen, made=model.options.inflation is None)
     nis = t.name(first.nis, "nis")
     t.section("guards")
-    guards.finite(t, [*work.y(seen), *first.D, nis] if sensor.gate is None else [*work.y(seen), *first.D])
+    sound = [*work.y(seen), *first.D, *u.tested, *(v for row in work.R for v in row)]
+    guards.finite(t, [*sound, nis] if sensor.gate is None else sound)
     guards.doubts(t, [v for row in linear.R for v in row])
     guards.positive(t, [*failures, *first.failures])
     gate(t, model, sensor, nis, used)
@@ -394,13 +402,14 @@ def whole_vector(ukf: Ukf, seeing: Seeing, taken: frozenset[str], partial: bool)
         P, final = work.inflated(seen, first, array, out)
     t.section("gain and covariance")
     failed: list[Value] = [] if final is first else list(final.failures)
-    sure = work.sure and seeing.points.positive
+    sure = work.sure
     moved: Vector = [0] * ukf.n
     likelihood: Value = t.zero
     for j in range(seeing.m):
         c = [final.columns[j][place] for place in ukf.order]
         P, bad = layout.downdated(t, P, c, final.D[j], ukf.tolerance, sure)
-        failed.append(bad)
+        if not work.definite:  # else it can only be round-off, and has been taken for zero
+            failed.append(bad)
         step = final.nu[j] * final.inverse[j]
         moved = [plus(a, times(b, step)) for a, b in zip(moved, c, strict=True)]
         term = final.nu[j] * step + t.function("log", final.D[j]) + t.value(log_two_pi())
@@ -415,7 +424,7 @@ def whole_vector(ukf: Ukf, seeing: Seeing, taken: frozenset[str], partial: bool)
     x = ukf.state.confined(t, x)
     t.section("guards")
     guards.finite(t, [nis, *x, *evidence])
-    if not layout.factored and not seeing.points.positive:
+    if not layout.factored and not work.definite:
         from kfgen.filters.gather import indefinite
 
         failed += indefinite(P, ukf.n * ukf.scalar.epsilon)
@@ -441,12 +450,13 @@ class _Whole:
         if u.adapted is not None:
             adapted = u.adapted.adapted(u.t, seen.spread, u.used)
             R = [[adapted[i, j] for j in range(m)] for i in range(m)]
-        elif any(r.constant is None for row in R for r in row):
-            for d in decorrelated(u.t, linear, R).variances:
-                require_nonnegative(d, "R is not positive semidefinite")
         self.R: Rows = [[R[i][j] + linear.added[i][j] for j in range(m)] for i in range(m)]
+        if u.adapted is None and any(r.constant is None for row in self.R for r in row):
+            for d in decorrelated(u.t, linear, self.R).variances:
+                require_nonnegative(d, "R is not positive semidefinite")
         diagonal = all(is_zero(self.R[i][j]) for i in range(m) for j in range(m) if i != j)
-        self.sure = diagonal and all(is_positive(self.R[i][i]) for i in range(m)) and seeing.points.positive
+        self.definite = seeing.points.positive and seeing.points.exact
+        self.sure = diagonal and all(is_positive(self.R[i][i]) for i in range(m)) and self.definite
 
     def y(self, seen: Seen) -> Vector:
         """z less its prediction; 0 for components that are not used."""
@@ -462,7 +472,8 @@ class _Whole:
             return [[seen.spread[i, j] for j in range(m)] for i in range(m)]
         return [[select(used[i] & used[j], seen.spread[i, j], self.u.t.zero) for j in range(m)] for i in range(m)]
 
-    def factored(self, seen: Seen) -> Factored:
+    def factored(self, seen: Seen, made: bool = True) -> Factored:
+        """made: whether the update is made of it, so that a floor is flagged."""
         t, used, m = self.u.t, self.u.used, self.seeing.m
         spread, R, cross = self.spread(seen), self.R, seen.cross
         if used is not None:
@@ -474,10 +485,15 @@ class _Whole:
         if floor is not None:
             for i in range(m):
                 low = S[i][i] < floor if used is None else (S[i][i] < floor) & used[i]
-                t.flag(low, "REGULARIZED")
+                if made:
+                    t.flag(low, "REGULARIZED")
                 S[i][i] = select(low, t.value(floor), S[i][i])
         names = [c.name for c in self.seeing.sensor.spec.components]
-        return factored(t, names, self.y(seen), S, cross, self.sure, 8 * self.ukf.scalar.epsilon)
+        epsilon = self.ukf.scalar.epsilon
+        # points differ from each other by the rounding of what h is made of, if by nothing else
+        total = sum(abs(w) for w in self.seeing.points.wc) * (32 * epsilon) ** 2
+        noise: Vector = [0 if self.sure or self.seeing.linear else z * z * total for z in seen.z]
+        return factored(t, names, self.y(seen), S, cross, self.sure, 8 * epsilon, noise)
 
     def inflated(
         self, seen: Seen, first: Factored, array: Array | None, out: Array | None

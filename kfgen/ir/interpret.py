@@ -47,8 +47,7 @@ def run(function: Function, scalar: Scalar, memory: Memory) -> set[str]:
     try:
         machine.block(function.body)
     except _Return as result:
-        kept = machine.flags if result.status == "GATED" else set()  # an error comes alone
-        return (kept | {result.status}) - {"OK"}
+        return {result.status} - {"OK"}  # an error comes alone, and so does a refusal: nothing has been done
     return machine.flags
 
 
