@@ -9,8 +9,17 @@ from typing import Protocol
 from kfgen.filters import guards, linalg
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.noise import Additive
-from kfgen.filters.numbers import assume_nonnegative, assume_positive, is_positive, is_zero, select, sqrt
+from kfgen.filters.noise import NEGATIVE, Additive
+from kfgen.filters.numbers import (
+    assume_nonnegative,
+    assume_positive,
+    is_constant,
+    is_positive,
+    is_zero,
+    require_nonnegative,
+    select,
+    sqrt,
+)  # fmt: skip
 from kfgen.filters.symmetric import Symmetric
 from kfgen.ir.trace import Trace, Value, Variable
 
@@ -206,3 +215,19 @@ def cholesky(P: Callable[[int, int], Value], n: int, tolerance: Fraction) -> tup
         for i in range(j + 1, n):
             S[i][j] = linalg.times(linalg.minus(P(j, i), linalg.dot(S[i][:j], S[j][:j])), inverse)
     return S, failures
+
+
+def noise_root(C: Rows, form: str, tolerance: Fraction) -> tuple[Rows, list[Value]]:
+    """A root of the covariance of noise inputs (q, q), of the kind that the form of the covariance has; and what of C
+    has to be tested to be finite. That C is a covariance is left to a guard."""
+    values = [v for row in C for v in row if v.constant is None]
+    if not C:
+        return [], values
+    U, D = linalg.udu(C)
+    for d in D:
+        require_nonnegative(d, NEGATIVE)
+    if form == "ud":
+        D = [d if is_constant(d) else select(d > 0, d, 0) for d in D]
+        return root_of_factors(U, D), values
+    S, _ = cholesky(lambda i, j: C[i][j], len(C), tolerance)
+    return S, values

@@ -8,21 +8,22 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from kfgen.filters import cloud, guards, linalg, process, rolled
+from kfgen.filters import cloud, guards, process, rolled
 from kfgen.filters.base import DT, INPUTS, KF, Block, FilterCode
 from kfgen.filters.cloud import Private
 from kfgen.filters.dual import Dual, Evaluator
 from kfgen.filters.ekf import Ekf, Update
-from kfgen.filters.gather import Gatherer, cholesky, gatherer, root_of_factors
+from kfgen.filters.gather import Gatherer, gatherer, noise_root
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.noise import NEGATIVE, Given
-from kfgen.filters.numbers import is_constant, is_zero, require_nonnegative, select
+from kfgen.filters.noise import Given
+from kfgen.filters.numbers import is_zero
 from kfgen.filters.points import PointSet, point_set
 from kfgen.filters.process import Step
+from kfgen.filters.seeing import Seeing
 from kfgen.filters.sensor import Linearised
 from kfgen.filters.symmetric import Symmetric
-from kfgen.filters.unscented import Seeing, whole_vector
+from kfgen.filters.unscented import whole_vector
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
@@ -364,22 +365,6 @@ class Ukf(Ekf):
         if seeing.linear:
             return super().residual_after(u, x, P)
         return seeing.residual(self, u, x, P)
-
-
-def noise_root(C: Rows, form: str, tolerance: Fraction) -> tuple[Rows, list[Value]]:
-    """A root of the covariance of noise inputs (q, q), of the kind that the form of the covariance has; and what of C
-    has to be tested to be finite. That C is a covariance is left to a guard."""
-    values = [v for row in C for v in row if v.constant is None]
-    if not C:
-        return [], values
-    U, D = linalg.udu(C)
-    for d in D:
-        require_nonnegative(d, NEGATIVE)
-    if form == "ud":
-        D = [d if is_constant(d) else select(d > 0, d, 0) for d in D]
-        return root_of_factors(U, D), values
-    S, _ = cholesky(lambda i, j: C[i][j], len(C), tolerance)
-    return S, values
 
 
 def _carried_by_process(model: Model) -> tuple[str, ...]:
