@@ -291,65 +291,66 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
     const float t12 = seen[7] * t11;
     const float t13 = seen[5] * t11;
     const float t14 = kf->S[0] * kf->S[0];
-    const float t15 = t13 * t13;
-    const bool t16 = 3.637979e-12f * t14 < t15;
-    const float t17 = t14 - t15;
-    const bool t18 = t16 && t17 <= 1.9073486e-6f * t14;
-    if (t18) { flags |= PENDULUM_REGULARIZED; }
-    const bool t19 = !t18;
-    const bool t20 = t16 && t19;
-    const float t21 = sqrtf(t20 ? t17 : 1.0f);
-    const float t22 = t20 ? 1.0f / kf->S[0] : 0.0f;
-    const float t23 = t13 * t22;
-    const float t24 = t18 ? 0.0f : (t20 ? t21 : kf->S[0]);
-    const float t25 = (kf->S[1] - t23 * t12) * (t20 ? kf->S[0] * (1.0f / t21) : 1.0f);
-    const float t26 = (t20 ? t21 * t22 : 1.0f) * t12 - t23 * t25;
-    const float t27 = t18 ? 0.0f : t25;
+    const float t15 = 3.637979e-12f * t14;
+    const float t16 = t13 * t13;
+    const bool t17 = t15 < t16;
+    const float t18 = t14 - t16;
+    const bool t19 = t17 && t18 <= 1.9073486e-6f * t14;
+    if (t19) { flags |= PENDULUM_REGULARIZED; }
+    const bool t20 = !t19;
+    const bool t21 = t17 && t20;
+    const float t22 = sqrtf(t21 ? t18 : 1.0f);
+    const float t23 = t21 ? 1.0f / kf->S[0] : 0.0f;
+    const float t24 = t13 * t23;
+    const float t25 = t19 ? 0.0f : (t21 ? t22 : kf->S[0]);
+    const float t26 = (kf->S[1] - t24 * t12) * (t21 ? kf->S[0] * (1.0f / t22) : 1.0f);
+    const float t27 = (t21 ? t22 * t23 : 1.0f) * t12 - t24 * t26;
     const float t28 = kf->S[2] * kf->S[2];
-    const float t29 = t26 * t26;
-    const bool t30 = t19 && 3.637979e-12f * (t28 + t27 * t27) < t29;
-    const float t31 = t28 - t29;
-    const bool t32 = t30 && t31 <= 1.9073486e-6f * t28;
-    if (t32) { flags |= PENDULUM_REGULARIZED; }
-    const bool t33 = t30 && !t32;
-    const float t34 = t32 ? 0.0f : (t33 ? sqrtf(t33 ? t31 : 1.0f) : kf->S[2]);
-    const float t35 = 1.0f / sqrtf(s_y);
-    const float t36 = t7 * t35;
-    const float t37 = t6 * t35;
-    const float t38 = t24 * t24;
-    const float t39 = t37 * t37;
-    const bool t40 = 3.637979e-12f * t38 < t39;
-    const float t41 = t38 - t39;
-    const bool t42 = t40 && t41 <= 1.9073486e-6f * t38;
-    if (t42) { flags |= PENDULUM_REGULARIZED; }
-    const bool t43 = !t42;
-    const bool t44 = t40 && t43;
-    const float t45 = sqrtf(t44 ? t41 : 1.0f);
-    const float t46 = t44 ? 1.0f / t24 : 0.0f;
-    const float t47 = t37 * t46;
-    const float s_angle_angle = t42 ? 0.0f : (t44 ? t45 : t24);
-    const float t48 = (t27 - t47 * t36) * (t44 ? t24 * (1.0f / t45) : 1.0f);
-    const float t49 = (t44 ? t45 * t46 : 1.0f) * t36 - t47 * t48;
-    const float s_rate_angle = t42 ? 0.0f : t48;
-    const float t50 = t34 * t34;
-    const float t51 = t49 * t49;
-    const bool t52 = t43 && 3.637979e-12f * (t50 + s_rate_angle * s_rate_angle) < t51;
-    const float t53 = t50 - t51;
-    const bool t54 = t52 && t53 <= 1.9073486e-6f * t50;
-    if (t54) { flags |= PENDULUM_REGULARIZED; }
-    const bool t55 = t52 && !t54;
-    const float s_rate_rate = t54 ? 0.0f : (t55 ? sqrtf(t55 ? t53 : 1.0f) : t34);
+    const float t29 = 3.637979e-12f * (t28 + kf->S[1] * kf->S[1]);
+    const float t30 = t27 * t27;
+    const bool t31 = t20 && t29 < t30;
+    const float t32 = t28 - t30;
+    const bool t33 = t31 && t32 <= 1.9073486e-6f * t28;
+    if (t33) { flags |= PENDULUM_REGULARIZED; }
+    const bool t34 = t31 && !t33;
+    const float t35 = t33 ? 0.0f : (t34 ? sqrtf(t34 ? t32 : 1.0f) : kf->S[2]);
+    const float t36 = 1.0f / sqrtf(s_y);
+    const float t37 = t7 * t36;
+    const float t38 = t6 * t36;
+    const float t39 = t38 * t38;
+    const bool t40 = t15 < t39;
+    const float t41 = t25 * t25;
+    const float t42 = t41 - t39;
+    const bool t43 = t40 && t42 <= 1.9073486e-6f * t41;
+    if (t43) { flags |= PENDULUM_REGULARIZED; }
+    const bool t44 = !t43;
+    const bool t45 = t40 && t44;
+    const float t46 = sqrtf(t45 ? t42 : 1.0f);
+    const float t47 = t45 ? 1.0f / t25 : 0.0f;
+    const float t48 = t38 * t47;
+    const float s_angle_angle = t43 ? 0.0f : (t45 ? t46 : t25);
+    const float t49 = ((t19 ? 0.0f : t26) - t48 * t37) * (t45 ? t25 * (1.0f / t46) : 1.0f);
+    const float t50 = (t45 ? t46 * t47 : 1.0f) * t37 - t48 * t49;
+    const float s_rate_angle = t43 ? 0.0f : t49;
+    const float t51 = t50 * t50;
+    const bool t52 = t44 && t29 < t51;
+    const float t53 = t35 * t35;
+    const float t54 = t53 - t51;
+    const bool t55 = t52 && t54 <= 1.9073486e-6f * t53;
+    if (t55) { flags |= PENDULUM_REGULARIZED; }
+    const bool t56 = t52 && !t55;
+    const float s_rate_rate = t55 ? 0.0f : (t56 ? sqrtf(t56 ? t54 : 1.0f) : t35);
 
     /* state */
     const float rate_next = kf->x[PENDULUM_RATE] + seen[7] * t8 + t7 * t9;
     const float angle_next = angle + seen[5] * t8 + t6 * t9;
-    const float t56 = pendulum_wrap(angle_next, 3.1415927f);
+    const float t57 = pendulum_wrap(angle_next, 3.1415927f);
 
     /* guards */
-    if (!pendulum_finite(nis + t56 + rate_next)) { return PENDULUM_NOT_FINITE; }
+    if (!pendulum_finite(nis + t57 + rate_next)) { return PENDULUM_NOT_FINITE; }
 
     /* store */
-    kf->x[PENDULUM_ANGLE] = t56;
+    kf->x[PENDULUM_ANGLE] = t57;
     kf->x[PENDULUM_RATE] = rate_next;
     kf->S[0] = s_angle_angle;
     kf->S[1] = s_rate_angle;

@@ -7,7 +7,7 @@ from fractions import Fraction
 from kfgen.filters import linalg
 from kfgen.filters.base import Block
 from kfgen.filters.gather import cholesky
-from kfgen.filters.layout import GainChange
+from kfgen.filters.layout import Covariance, GainChange
 from kfgen.filters.linalg import Measurement, Rows, Vector
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, is_positive, is_zero, select, sqrt
@@ -153,7 +153,7 @@ class Full:
         return [[S[i][j] for i in range(self.n)] for j in range(self.n)], failures
 
     def downdated(
-        self, t: Trace, P: Symmetric, c: Vector, s: Number, tolerance: Fraction, sure: bool
+        self, t: Trace, P: Symmetric, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Covariance
     ) -> tuple[Symmetric, Value]:
         inverse = 1 / s
         K = [linalg.times(x, inverse) for x in c]

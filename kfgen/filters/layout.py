@@ -90,11 +90,12 @@ class Layout(Protocol):
         ...
 
     def downdated(
-        self, t: Trace, P: Covariance, c: Vector, s: Number, tolerance: Fraction, sure: bool
+        self, t: Trace, P: Covariance, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Covariance
     ) -> tuple[Covariance, Value]:
         """P - c c^T / s, s > 0, and the condition under which that is indefinite beyond `tolerance`, relative.
 
-        sure: it cannot be, but for rounding that leaves variances positive.
+        sure: it cannot be, but for rounding that leaves variances positive. prior: P before all of an update, to
+        which round-off is relative.
         """
         ...
 

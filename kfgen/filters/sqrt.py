@@ -10,7 +10,7 @@ from fractions import Fraction
 from kfgen.filters import linalg
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.gather import columns_of, root_of_factors
-from kfgen.filters.layout import GainChange
+from kfgen.filters.layout import Covariance, GainChange
 from kfgen.filters.linalg import Measurement, Rows, Vector
 from kfgen.filters.noise import NEGATIVE, Additive
 from kfgen.filters.numbers import (
@@ -92,7 +92,8 @@ class Sqrt:
         # in the order of the spec's lower factor: its first column is the inner order's last
         return columns_of(P)[::-1], []
 
-    def downdated(self, t: Trace, P: Rows, c: Vector, s: Number, tolerance: Fraction, sure: bool) -> tuple[Rows, Value]:
+    def downdated(self, t: Trace, P: Rows, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Covariance
+    ) -> tuple[Rows, Value]:
         """S S^T - w w^T, w = c / sqrt(s), by the downdate of van der Merwe & Wan 2001 (Golub & Van Loan 6.5.4).
 
         r^2 = S_jj^2 - w_j^2, S_ij <- (S_ij - w_j w_i / S_jj) S_jj / r, w_i <- (r w_i - w_j S_ij) / S_jj with the new
@@ -107,7 +108,7 @@ class Sqrt:
         for j in reversed(range(n)):
             if is_zero(w[j]):
                 continue
-            small = tolerance * tolerance * linalg.dot(S[j][j:], S[j][j:])
+            small = tolerance * tolerance * linalg.dot(prior[j][j:], prior[j][j:])
             acts = left & (w[j] * w[j] > small)
             square = S[j][j] * S[j][j] - w[j] * w[j]
             limit = S[j][j] * S[j][j] * tolerance

@@ -7,7 +7,7 @@ from fractions import Fraction
 from kfgen.filters import linalg
 from kfgen.filters.base import Block
 from kfgen.filters.gather import columns_of, root_of_factors
-from kfgen.filters.layout import GainChange
+from kfgen.filters.layout import Covariance, GainChange
 from kfgen.filters.linalg import Measurement, Rows, Vector
 from kfgen.filters.noise import NEGATIVE, Additive
 from kfgen.filters.numbers import Number, assume_nonnegative, is_one, is_zero, require_nonnegative, select
@@ -176,8 +176,8 @@ class UD:
     def root(self, P: tuple[Rows, Vector], tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
         return columns_of(root_of_factors(*P)), []
 
-    def downdated(self, t: Trace, P: tuple[Rows, Vector], c: Vector, s: Number, tolerance: Fraction, sure: bool
-                  ) -> tuple[tuple[Rows, Vector], Value]:  # fmt: skip
+    def downdated(self, t: Trace, P: tuple[Rows, Vector], c: Vector, s: Number, tolerance: Fraction, sure: bool,
+                  prior: Covariance) -> tuple[tuple[Rows, Vector], Value]:  # fmt: skip
         U, D = [list(row) for row in P[0]], list(P[1])
         smallest = None
         if not sure:

@@ -123,13 +123,14 @@ def whole_vector(ukf: Ukf, seeing: Seeing, taken: frozenset[str], partial: bool)
     if model.options.inflation is not None:
         P, final = work.inflated(seen, first, array, out)
     t.section("gain and covariance")
+    prior = P
     failed: list[Value] = [] if final is first else list(final.failures)
     sure = work.sure
     moved: Vector = [0] * ukf.n
     likelihood: Value = t.zero
     for j in range(seeing.m):
         c = [final.columns[j][place] for place in ukf.order]
-        P, bad = layout.downdated(t, P, c, final.D[j], ukf.tolerance, sure)
+        P, bad = layout.downdated(t, P, c, final.D[j], ukf.tolerance, sure, prior)
         if not work.definite:  # else it can only be round-off, and has been taken for zero
             failed.append(bad)
         step = final.nu[j] * final.inverse[j]

@@ -202,7 +202,7 @@ measurements:
 filter: {type: ukf}
 """
 # of points with negative weights where h is linear: where it bends, S may be negative
-SENSORS = [("a*a/10", "cubature")]
+SENSORS = [("a", "merwe"), ("a*a/10", "cubature")]
 
 
 @pytest.mark.parametrize(("h", "kind"), SENSORS)
