@@ -238,8 +238,7 @@ tracker_status_t tracker_update_fix(tracker_t *kf, const tracker_fix_t *z)
     const float vy_next = kf->x[TRACKER_VY] + t37 * weighed_x + t55 * weighed_y;
 
     /* guards */
-    if (!tracker_finite(nis + px_next + py_next + vx_next + vy_next + s_x_1 + s_y_1 + d_px + d_vx
-        + d_py + d_vy)) {
+    if (!tracker_finite(nis + px_next + py_next + vx_next + vy_next + s_x_1 + s_y_1)) {
         return TRACKER_NOT_FINITE;
     }
     if (!(s_x_1 > 0.0f) || !(s_y_1 > 0.0f)) { return TRACKER_NOT_POSITIVE; }
@@ -417,8 +416,7 @@ tracker_status_t tracker_update_fix_masked(tracker_t *kf, const tracker_fix_t *z
     const float vy_next = kf->x[TRACKER_VY] + t50 * weighed_x + t71 * weighed_y;
 
     /* guards */
-    if (!tracker_finite(nis + px_next + py_next + vx_next + vy_next + s_x_1 + s_y_1 + d_px + d_vx
-        + d_py + d_vy)) {
+    if (!tracker_finite(nis + px_next + py_next + vx_next + vy_next + s_x_1 + s_y_1)) {
         return TRACKER_NOT_FINITE;
     }
     if (!(s_x_1 > 0.0f) || !(s_y_1 > 0.0f)) { return TRACKER_NOT_POSITIVE; }

@@ -212,7 +212,8 @@ class Ekf:
         result = self.sequence(u, innovation, plain=True)
         final = self.final(u, innovation, result)
         x = self.moved(u, final.moved)
-        evidence = self.unconfined(x) + self.layout.evidence(final.P, after_predict=final is not result)
+        inflates = self.model.options.inflation is not None and not self.layout.factored
+        evidence = self.unconfined(x) + self.layout.evidence(final.P, after_predict=inflates)
         P = self.limited(t, final.P)
         x = self.state.confined(t, x)
         t.section("guards")
