@@ -12,6 +12,7 @@ from kfgen.filters.ekf import Update
 from kfgen.filters.gather import noise_root
 from kfgen.filters.layout import Covariance
 from kfgen.filters.linalg import Rows, Vector, times
+from kfgen.filters.noise import Given
 from kfgen.filters.numbers import (
     assume_nonnegative,
     is_zero,
@@ -19,7 +20,7 @@ from kfgen.filters.numbers import (
     select,
 )  # fmt: skip
 from kfgen.filters.points import PointSet
-from kfgen.filters.sensor import Linearised, SensorCode
+from kfgen.filters.sensor import Linearised, SensorCode, total
 from kfgen.filters.symmetric import Symmetric
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
@@ -277,6 +278,8 @@ class Seeing:
             H.append(_solved(U, D, [seen.cross[i][a] for i in range(self.n)], known))
         linear = replace(u.code.linearise(u.x), y=u.code.residuals(u.x, seen.z), H=H)
         if self.carried:
+            if u.used is None and any(r.constant is None for row in total(linear) for r in row):
+                Given(total(linear)).factors()  # tested before the rest comes in
             V, C = linalg.udu(self.noise_covariance(u))
             none: Vector = [t.zero] * self.q
             rows = [_solved(V, C, [seen.noise[i][a] for i in range(self.q)], none) for a in range(self.m)]

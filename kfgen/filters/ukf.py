@@ -22,6 +22,7 @@ from kfgen.filters.points import PointSet, point_set
 from kfgen.filters.process import Step
 from kfgen.filters.seeing import Seeing
 from kfgen.filters.sensor import Linearised
+from kfgen.filters.sequence import Updated
 from kfgen.filters.symmetric import Symmetric
 from kfgen.filters.unscented import whole_vector
 from kfgen.ir.program import Argument, Function
@@ -151,8 +152,8 @@ class Ukf(Ekf):
         x = self.state.confined(t, x)
         t.section("guards")
         doubtful = [v for row in result.Q for v in row] + [d for _, d in result.noise]
+        guards.doubts(t, [*x, *doubtful, *tested])
         guards.finite(t, [*x, *evidence, *tested])
-        guards.doubts(t, doubtful)
         guards.positive(t, failures)
         self.store(t, x, set(range(self.n)), P, after_predict=True)
         if self.keeps:
@@ -355,8 +356,8 @@ class Ukf(Ekf):
     def spread(self, u: Update, linear: Linearised) -> Symmetric:
         return super().spread(u, linear) if self.seeing[u.sensor.name].linear else self._spread
 
-    def store_update(self, u: Update, *rest: object) -> None:
-        super().store_update(u, *rest)  # type: ignore[arg-type]
+    def store_update(self, u: Update, x: list[Value], P: Covariance, judged: Updated, final: Updated) -> None:
+        super().store_update(u, x, P, judged, final)
         if self.keeps:
             u.t.store("kf.kept", None, u.t.wrapped(u.t.pool.boolean(False)))
 

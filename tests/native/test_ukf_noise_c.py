@@ -71,6 +71,8 @@ measurements:
 filter: {type: ukf}
 """
 APART = FREE.replace("NOISE", "{w: {var: a}, v: {var: b}}")
+ADDED = APART.replace("+ v*y", "+ v")  # v shifts, and is not carried
+TWO = APART.replace('var: 0.5}}\n    noise', 'var: 0.5}, z2: {h: y + 0.5*e2, var: 0.25}}\n    noise')
 CORRELATED = FREE.replace("NOISE", "{w: {}, v: {}}\nnoise_covariance: [[a, 0.1], [0.1, b]]")
 
 
@@ -86,7 +88,8 @@ def differ(text: str, form: str, changes: dict[str, float], update: bool) -> str
     for name, value in changes.items():
         kf.parameters[name] = ref.parameters[name] = value
     before = bytes(kf)
-    found, truth = (each.update("s", [1.5]) if update else each.predict() for each in (kf, ref))
+    z = [1.5, 2.0][: len(kf.components("s"))]
+    found, truth = (each.update("s", z) if update else each.predict() for each in (kf, ref))
     if found != truth:
         return f"{changes}: {describe(found)} for {describe(truth)}"
     if found >= ERROR:
@@ -99,14 +102,15 @@ VALUES = (-1.0, -1e-3, 0.0, 2.0, math.nan, math.inf)
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("which", ["apart", "correlated", "measured"])
+@pytest.mark.parametrize("which", ["apart", "added", "correlated", "measured", "measured two"])
 def test_variances_that_are_none(form, which):
     """NOT_FINITE before NOT_POSITIVE, and neither where they are 0; a covariance of 0.1 needs a b of 0.01."""
-    text = CORRELATED if which == "correlated" else APART
+    texts = {"added": ADDED, "correlated": CORRELATED, "measured two": TWO}
+    text, update = texts.get(which, APART), which.startswith("measured")
     cases = [{name: value} for name in ("a", "b") for value in VALUES]
-    if which != "measured":
+    if not update:
         cases += [{"a": -1.0, "q": 0.0}, {"q": 0.0}, {"a": 0.1, "b": 0.1}, {"a": 0.0099, "b": 1.0}]
-    wrong = [each for changes in cases if (each := differ(text, form, changes, which == "measured"))]
+    wrong = [each for changes in cases if (each := differ(text, form, changes, update))]
     assert not wrong, "\n".join(wrong)
 
 
