@@ -142,7 +142,8 @@ class Steady(Ekf):
         F, Q, P0 = self._transition.F, self._transition.Q, self.model.P0
         starts = [(P0, _MOST_STEPS)]
         try:
-            P = symmetric(solve_discrete_are(F.T, np.vstack(self._H).T, Q, block_diag(*self._R)))
+            solution = solve_discrete_are(F.T, np.vstack(self._H).T, Q, block_diag(*self._R))
+            P = symmetric(np.asarray(solution, np.float64))
         except (LinAlgError, ValueError):
             pass
         else:
