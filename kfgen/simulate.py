@@ -31,6 +31,7 @@ from kfgen.reference.model import Context, Model, fixed_step, wrap
 from kfgen.reference.process import Process
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import StepError
+from kfgen.spec.modes import mode_specs
 from kfgen.spec.tree import Expression, Number
 from kfgen.spec.types import Matrix, Noise, Sensor, Spec
 
@@ -68,7 +69,7 @@ def simulate(
 
 
 def _simulate(spec: Spec, steps: int, random: np.random.Generator, every: Mapping[str, int], gaps: float) -> Log:
-    worlds = [_World(each) for each in _mode_specs(spec)]
+    worlds = [_World(each) for each in mode_specs(spec)]
     model = worlds[0].model
     t, dt = _times(spec, model, steps, random)
     u = _inputs(spec, model, steps, random)
@@ -220,20 +221,6 @@ def _inputs(spec: Spec, model: Model, steps: int, random: np.random.Generator) -
         waves = np.sin(2 * math.pi * k[:, None] / periods + phases)
         u[:, i] = middle + amplitude * waves.mean(axis=1)
     return u
-
-
-def _mode_specs(spec: Spec) -> list[Spec]:
-    """The spec itself, or each mode of an imm as a spec of its own."""
-    if spec.imm is None:
-        return [spec]
-    return [
-        replace(
-            spec, imm=None, states=mode.states, covariances=mode.covariances, P0=mode.P0, noise=mode.noise,
-            noise_covariance=mode.noise_covariance, let=mode.let, dynamics=mode.dynamics,
-            measurements=mode.measurements, filter=mode.filter,
-        )
-        for mode in spec.imm.modes
-    ]  # fmt: skip
 
 
 def _mode_track(spec: Spec, model: Model, steps: int, random: np.random.Generator) -> list[int]:

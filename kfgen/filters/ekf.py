@@ -6,25 +6,27 @@ update: see `sequence`. The filters that linearise otherwise are subclasses: iek
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from kfgen.filters import guards, process
 from kfgen.filters.adapt import AdaptedQ, AdaptedR
-from kfgen.filters.base import DT, INPUTS, KF, MASK, Block, FilterCode, sensor_argument
+from kfgen.filters.base import Block, FilterCode
 from kfgen.filters.covariance import CovarianceCode, get_matrix
-from kfgen.filters.gate import gate
+from kfgen.filters.gate import gate, store_outcome
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector, plus
 from kfgen.filters.linalg import dot as inner_product
 from kfgen.filters.noise import Additive, Given
 from kfgen.filters.numbers import is_positive, require_nonnegative
+from kfgen.filters.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.process import Advance, Prior, Step
-from kfgen.filters.sensor import Innovation, Linearised, SensorCode, decorrelated, masked, needs_inputs, total
+from kfgen.filters.sensor import Innovation, Linearised, SensorCode, decorrelated, masked, total
 from kfgen.filters.sequence import Sequence, Updated, departs
-from kfgen.filters.state import StateCode, counts_gated
+from kfgen.filters.state import StateCode
 from kfgen.filters.symmetric import Symmetric
-from kfgen.ir.program import Argument, Function
+from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
@@ -58,6 +60,14 @@ class Update:
         return self.layout.load(self.t)
 
 
+@dataclass
+class Learnt:
+    """What an update leaves for an adapted R (m,), and the next Q."""
+
+    residual: Vector = field(default_factory=list)
+    Q: tuple[Symmetric, tuple[Rows, Vector] | None] | None = None
+
+
 class Ekf:
     """Emits a kf or an ekf over any layout."""
 
@@ -77,13 +87,14 @@ class Ekf:
             adapted = self.adapted_R(sensor)
             extra += [] if adapted is None else adapted.blocks()
         extra += self.extra_blocks()
+        outdated = (self.outdated,) if self.outdated else ()
         self.covariance = CovarianceCode(model, layout, scalar.epsilon, self.outdated)
-        self.state = StateCode(model, self.covariance.blocks(), tuple(extra), self.outdated)
+        self.state = StateCode(model, self.covariance.blocks(), tuple(extra), outdated)
 
     def code(self, taken: frozenset[str]) -> FilterCode:
         """The complete filter. taken: names that locals must not have."""
         model = self.model
-        functions = [self.state.init(taken), *self.private_functions(), self.predict(taken)]
+        functions = [self.state.init(taken), *self.private_functions(taken), self.predict(taken)]
         for sensor in model.sensors:
             functions.append(self.update(sensor, taken))
             if sensor.spec.partial:
@@ -121,7 +132,8 @@ class Ekf:
     def extra_blocks(self) -> list[Block]:
         return []
 
-    def private_functions(self) -> list[Function]:
+    def private_functions(self, taken: frozenset[str]) -> list[Function]:
+        """What the steps call; made before them."""
         return []
 
     def further_functions(self, taken: frozenset[str]) -> list[Function]:
@@ -150,15 +162,17 @@ class Ekf:
 
     def predict(self, taken: frozenset[str]) -> Function:
         """x <- f(x, u, 0), P <- F P F^T + Q + G Qw G^T."""
-        model, t = self.model, Trace(self.scalar.smallest)
-        arguments: list[Argument] = [KF]
-        if model.inputs:
-            arguments.append(INPUTS)
-            t.section("arguments")
-            guards.inputs(t, model.inputs)
-        if model.dt is None and model.spec.dt is not None:
-            arguments.append(DT)
-        step = process.step_length(t, model)
+        t = Trace(self.scalar.smallest)
+        arguments, step = begin_predict(t, self.model)
+        for _ in self.predicting(t, step):
+            pass
+        process.store_time(t, self.model, step)
+        names = taken | {a.name for a in arguments}
+        return Function("predict", arguments, schedule(t, names), predict_doc(self.model))
+
+    def predicting(self, t: Trace, step: Step) -> Phases:
+        """The step from the estimate in the struct."""
+        model = self.model
         prior = process.given(t, model, step)
         t.section("model")
         result = self.advance(t, prior, step)
@@ -178,14 +192,8 @@ class Ekf:
         values = [v for rows in (F, result.Q) for row in rows for v in row]
         guards.doubts(t, [*result.x, *values, *(d for _, d in noise)])
         guards.finite(t, [x[i] for i in sorted(moved)] + evidence)
-        self.store(t, x, moved, P, after_predict=True)
-        process.store_time(t, model, step)
-        length = "a step of dt" if model.dt is None else f"one step of {float(model.dt):.6g} s"
-        if model.spec.dt is None:
-            length = "one step"
-        return Function(
-            "predict", arguments, schedule(t, taken | {a.name for a in arguments}), f"Advance the estimate by {length}."
-        )
+        yield Made(x, P)
+        self.store(t, x, moved if t.in_place else set(range(len(x))), P, after_predict=True)
 
     def advance(self, t: Trace, prior: Prior, step: Step) -> Advance:
         """The model's step from the prior, in the spec's order."""
@@ -203,14 +211,28 @@ class Ekf:
     def update(self, sensor: SensorModel, taken: frozenset[str], partial: bool = False) -> Function:
         """The update with the whole vector z of a sensor, or with the components that a mask selects."""
         model, t = self.model, Trace(self.scalar.smallest)
-        arguments, used = self.opening(t, sensor, partial)
+        arguments, used = begin_update(t, [model], [sensor], partial)
+        self.state.initialize(t, sensor, used)
+        for phase in self.updating(t, sensor, used):
+            if isinstance(phase, Judged):
+                gate(t, model, [sensor], [phase.nis], used)
+            else:
+                made = phase
+        assert made.nis is not None
+        assert made.log_likelihood is not None
+        store_outcome(t, model, [sensor], made.nis, made.log_likelihood)
+        name, doc = update_name(sensor, partial)
+        return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
+
+    def updating(self, t: Trace, sensor: SensorModel, used: list[Value] | None) -> Phases:
+        """The update of the estimate in the struct. used: whether each component counts, where a mask tells."""
         t.section("innovation")
-        code = SensorCode(t, model, sensor, self.order, self.derivatives, self.skipped(sensor))
+        code = SensorCode(t, self.model, sensor, self.order, self.derivatives, self.skipped(sensor))
         u = Update(t, sensor, code, code.prior(), self.layout, used, self.adapted_R(sensor))
         linear = self.linearise(u)
         innovation = self.innovation(u, linear)
         result = self.sequence(u, innovation, plain=True)
-        final = self.final(u, innovation, result)
+        final = yield from self.final(u, innovation, result)
         x = self.moved(u, final.moved)
         inflates = self.model.options.inflation is not None and not self.layout.factored
         evidence = self.unconfined(x) + self.layout.evidence(final.P, after_predict=inflates)
@@ -224,36 +246,15 @@ class Ekf:
             guards.finite(t, [*skippable, *x, result.nis, *evidence, *u.tested])
             guards.positive(t, result.failures)
         elif final is result:
-            self.judged(u, innovation, result)
+            yield from self.judged(u, innovation, result)
             guards.finite(t, [result.nis, *x, *evidence])
         else:
             guards.doubts(t, x)
             guards.finite(t, [result.nis, *x, *final.s, *evidence])
             guards.positive(t, final.failures)
-        self.store_update(u, x, P, result, final)
-        suffix, what = ("_masked", "the chosen components of a measurement") if partial else ("", "a measurement")
-        return Function(
-            f"update_{sensor.name}{suffix}", arguments, schedule(t, taken | {a.name for a in arguments}),
-            f"Take {what} of {sensor.name} into account.",
-        )  # fmt: skip
-
-    def opening(self, t: Trace, sensor: SensorModel, partial: bool) -> tuple[list[Argument], list[Value] | None]:
-        """The arguments of an update, tested, and whether each component counts where a mask tells."""
-        arguments: list[Argument] = [KF, sensor_argument(sensor.name)]
-        used: list[Value] | None = None
-        if partial:
-            used = [t.bit("mask", i) for i in range(len(sensor.h))]
-            some = used[0]
-            for bit in used[1:]:
-                some = some | bit
-            t.guard(~some, "OK")
-        if needs_inputs(self.model, sensor):
-            arguments.append(INPUTS)
-            guards.inputs(t, self.model.inputs)
-        if partial:
-            arguments.append(MASK)
-        self.state.initialize(t, sensor, used)
-        return arguments, used
+        kept = self.prepared(u, x, P, final)
+        yield Made(x, P, result.nis, final.log_likelihood)
+        self.store_update(u, x, P, kept)
 
     def linearise(self, u: Update) -> Linearised:
         """h, H, R of the sensor at the prior."""
@@ -284,10 +285,10 @@ class Ekf:
         H, dense = linear.H, self.layout.entries(u.P)
         return Symmetric(len(H), lambda i, j: inner_product(H[i], dense.times(H[j])))
 
-    def final(self, u: Update, innovation: Innovation, plain: Updated) -> Updated:
+    def final(self, u: Update, innovation: Innovation, plain: Updated) -> Generator[Judged | Made, None, Updated]:
         """The update that is made of the one that the gate judges."""
         if departs(self.model):
-            self.judged(u, innovation, plain)
+            yield from self.judged(u, innovation, plain)
         return self.made(u, innovation, plain)
 
     def made(self, u: Update, innovation: Innovation, plain: Updated) -> Updated:
@@ -301,39 +302,38 @@ class Ekf:
         names = [c.name for c in u.sensor.spec.components]
         return Sequence(u.t, self.model, self.layout, names, plain, self.scalar.epsilon).run(u.P, innovation)
 
-    def judged(self, u: Update, innovation: Innovation, plain: Updated) -> None:
-        """Guards and gate over the textbook's update. A far outlier may overflow nis and is gated all the same."""
+    def judged(self, u: Update, innovation: Innovation, plain: Updated) -> Phases:
+        """Guards, and then the gate, over the textbook's update. A far outlier may overflow nis and is gated all the
+        same."""
         t = u.t
         t.section("guards")
         guards.doubts(t, [*self._model_values(innovation), *u.tested])
         guards.finite(t, [*innovation.y, *plain.s, *u.tested])
         guards.positive(t, plain.failures)
-        gate(t, self.model, u.sensor, plain.nis, u.used)
+        yield Judged(plain.nis)
 
-    def store_update(self, u: Update, x: list[Value], P: Covariance, judged: Updated, final: Updated) -> None:
-        t, sensor = u.t, u.sensor
-        after: Vector = []
-        Q: tuple[Symmetric, tuple[Rows, Vector] | None] | None = None
+    def prepared(self, u: Update, x: list[Value], P: Covariance, final: Updated) -> Learnt:
+        """What an update has to say of R and Q."""
+        t = u.t
+        learnt = Learnt()
         if u.adapted is not None:
             t.section("R: the residual that is left")
-            after = self.residual_after(u, x, P)
+            learnt.residual = self.residual_after(u, x, P)
             if u.used is not None:
-                after = [t.select(bit, e, 0) for bit, e in zip(u.used, after, strict=True)]
-            guards.finite(t, after)
+                learnt.residual = [t.select(bit, e, 0) for bit, e in zip(u.used, learnt.residual, strict=True)]
+            guards.finite(t, learnt.residual)
         if self.Q is not None:
             t.section("Q: what the state has moved")
-            Q = self.Q.next(t, final.steps)
-            guards.finite(t, [t.value(Q[0][i, i]) for i in range(len(x))])
-        self.store(t, x, set(range(len(x))), P, after_predict=False)
+            learnt.Q = self.Q.next(t, final.steps)
+            guards.finite(t, [t.value(learnt.Q[0][i, i]) for i in range(len(x))])
+        return learnt
+
+    def store_update(self, u: Update, x: list[Value], P: Covariance, learnt: Learnt) -> None:
+        self.store(u.t, x, set(range(len(x))), P, after_predict=False)
         if u.adapted is not None:
-            u.adapted.store(t, after, u.used)
-        if self.Q is not None and Q is not None:
-            self.Q.kept.store(t, *Q)
-        if counts_gated(self.model, sensor):
-            t.store(f"kf.gate_count_{sensor.name}", None, t.wrapped(t.pool.integer(0)))
-        t.store("kf.nis", None, judged.nis)
-        if self.model.spec.code.log_likelihood:
-            t.store("kf.log_likelihood", None, final.log_likelihood)
+            u.adapted.store(u.t, learnt.residual, u.used)
+        if self.Q is not None and learnt.Q is not None:
+            self.Q.kept.store(u.t, *learnt.Q)
 
     def residual_after(self, u: Update, x: list[Value], P: Covariance) -> Vector:
         """z - h at the new x."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import reduce
+from operator import and_
 
 from kfgen.filters.numbers import select
 from kfgen.filters.state import counts_gated
@@ -13,28 +15,45 @@ from kfgen.model.model import SensorModel
 from kfgen.quantiles import chi2_quantile
 
 
-def gate(t: Trace, model: Model, sensor: SensorModel, nis: Value, used: list[Value] | None) -> None:
+def gate(t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], used: list[Value] | None) -> None:
     """End the update where nis is beyond the gate; after reset_after rejections take it all the same.
 
-    used: whether each component counts, where a mask tells.
+    A bank has the sensor and nis of each of its modes, and refuses what all of them refuse. used: whether each
+    component counts, where a mask tells.
     """
-    if sensor.gate is None:
+    gates = [sensor.gate for sensor in sensors if sensor.gate is not None]
+    if len(gates) < len(sensors):
         return
     t.section("gate")
-    beyond = nis > chi2_threshold(t, sensor.gate, len(sensor.h), used)
-    before = [Store("kf.nis", None, nis.node)]
-    if not counts_gated(model, sensor):
+    beyond = reduce(and_, [v > chi2_threshold(t, p, len(sensors[0].h), used) for p, v in zip(gates, nis, strict=True)])
+    before = [Store("kf.nis", None, smallest(t, nis).node)]
+    if not counts_gated(model, sensors):
         t.guard(beyond, "GATED", before=before)
         return
-    path = f"kf.gate_count_{sensor.name}"
+    path = f"kf.gate_count_{sensors[0].name}"
     count = t.wrapped(t.pool.make("field", (), path, "int"))
     before.append(Store(path, None, (count + 1).node))
-    limit = sensor.spec.gate.reset_after if sensor.spec.gate is not None else None
-    if limit is None:
+    limits = [s.spec.gate.reset_after for s in sensors if s.spec.gate and s.spec.gate.reset_after is not None]
+    if not limits:
         t.guard(beyond, "GATED", before=before)
         return
-    t.guard(beyond & (count < limit), "GATED", before=before)
+    t.guard(beyond & (count < min(limits)), "GATED", before=before)
     t.flag(beyond, "ANOMALY")
+
+
+def smallest(t: Trace, values: list[Value]) -> Value:
+    return reduce(lambda a, b: t.function("min", a, b), values)
+
+
+def store_outcome(
+    t: Trace, model: Model, sensors: list[SensorModel], nis: Value, log_likelihood: Value
+) -> None:
+    """What an accepted update leaves beside the estimate."""
+    if counts_gated(model, sensors):
+        t.store(f"kf.gate_count_{sensors[0].name}", None, t.wrapped(t.pool.integer(0)))
+    t.store("kf.nis", None, nis)
+    if model.spec.code.log_likelihood:
+        t.store("kf.log_likelihood", None, log_likelihood)
 
 
 def chi2_threshold(t: Trace, probability: Fraction, m: int, used: list[Value] | None) -> Value:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import replace
 
 from kfgen.filters.ekf import Ekf, Update
 from kfgen.filters.linalg import dot, plus
 from kfgen.filters.numbers import is_zero
+from kfgen.filters.phases import Judged, Made
 from kfgen.filters.sensor import Innovation
 from kfgen.filters.sequence import Updated
 
@@ -19,11 +21,11 @@ class Iekf(Ekf):
     def description(self) -> str:
         return f"{super().description()}, {self.model.spec.filter.iterations} linearisations"
 
-    def final(self, u: Update, innovation: Innovation, plain: Updated) -> Updated:
+    def final(self, u: Update, innovation: Innovation, plain: Updated) -> Generator[Judged | Made, None, Updated]:
         iterations = self.model.spec.filter.iterations or 1
         if iterations == 1:
-            return super().final(u, innovation, plain)
-        self.judged(u, innovation, plain)
+            return (yield from super().final(u, innovation, plain))
+        yield from self.judged(u, innovation, plain)
         result = self.made(u, innovation, plain)
         for k in range(2, iterations + 1):
             u.t.section(f"linearisation {k} of {iterations}")

@@ -214,7 +214,7 @@ class Seeing:
             self.run(u, seen, array)
             return seen, array, failures
         array = t.array("cloud", len(self.points.rows) * self.stride)
-        fresh = ~t.wrapped(t.pool.make("field", (), "kf.kept", "bool"))
+        fresh = ~t.field("kf.kept", "bool")
         with t.when(fresh):
             guards.positive(t, self.redraw(ukf, u, array))
             self.run(u, seen, array)

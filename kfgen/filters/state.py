@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 from kfgen.filters.base import KF, Block
@@ -13,23 +14,28 @@ from kfgen.model import Model
 from kfgen.model.model import SensorModel
 
 
-def counts_gated(model: Model, sensor: SensorModel) -> bool:
-    """Whether the filter counts the sensor's rejections: where it is asked to, or has to."""
-    gate = sensor.spec.gate
-    return gate is not None and (model.spec.code.gate_count or gate.reset_after is not None)
+def counts_gated(model: Model, sensors: Sequence[SensorModel]) -> bool:
+    """Whether the filter counts a sensor's rejections: where it is asked to, or has to.
+
+    sensors: the sensor as each mode of a bank has it.
+    """
+    gates = [sensor.spec.gate for sensor in sensors if sensor.spec.gate is not None]
+    return any(model.spec.code.gate_count or gate.reset_after is not None for gate in gates)
 
 
 class StateCode:
     """Traces the functions that do not depend on the algorithm."""
 
     def __init__(
-        self, model: Model, covariance: tuple[Block, ...], extra: tuple[Block, ...] = (), outdated: str = ""
+        self, model: Model, covariance: tuple[Block, ...], extra: tuple[Block, ...] = (),
+        outdated: tuple[str, ...] = (), states: tuple[str, ...] = ("kf.x",),
     ) -> None:
-        """covariance: the fields that hold it; extra: what else the algorithm keeps.
+        """covariance: the fields that hold it; extra: what else the algorithm keeps. states: the fields that hold x.
 
-        outdated: a field that says whether something of it belongs to the present state, false when that is set.
+        outdated: fields that say whether something of it belongs to the present state, false when that is set.
         """
         self.outdated = outdated
+        self.states = states
         self.model = model
         self.covariance = covariance
         self.extra = extra
@@ -43,7 +49,7 @@ class StateCode:
         out += self.covariance
         out.append(Block("nis", None, "normalised innovation squared of the last update"))
         for sensor in model.sensors:
-            if counts_gated(model, sensor):
+            if counts_gated(model, [sensor]):
                 doc = f"measurements of {sensor.name} refused in a row"
                 out.append(Block(f"gate_count_{sensor.name}", None, doc, kind="uint32"))
         if model.spec.code.log_likelihood:
@@ -93,13 +99,11 @@ class StateCode:
         t.guard(~t.finite(sum(readings[1:], readings[0])), "NOT_FINITE")
         x = [t.field(f"z.{start.states[s]}") if s in start.states else t.zero for s in self.model.states]
         x = self.confined(t, x)
-        stores = [
-            Store("kf.x", t.pool.integer(i), x[i].node) for i, s in enumerate(self.model.states) if s in start.states
-        ]
+        set_here = [i for i, s in enumerate(self.model.states) if s in start.states]
+        stores = [Store(path, t.pool.integer(i), x[i].node) for path in self.states for i in set_here]
         stores.append(Store("kf.nis", None, t.pool.zero))
         stores.append(Store("kf.initialized", None, t.pool.boolean(True)))
-        if self.outdated:
-            stores.append(Store(self.outdated, None, t.pool.boolean(False)))
+        stores += [Store(path, None, t.pool.boolean(False)) for path in self.outdated]
         t.guard(~done, "OK", before=stores)
 
     # functions ---------------------------------------------------------------------------------------
@@ -133,10 +137,11 @@ class StateCode:
         for value in given:  # one by one: the sum of large numbers would overflow
             t.guard(~t.finite(value), "NOT_FINITE")
         x = [v if p is None else t.wrap(v, p) for v, p in zip(given, self.model.periods, strict=True)]
-        for i, value in enumerate(x):
-            t.store("kf.x", i, value)
-        if self.outdated:
-            t.store(self.outdated, None, t.wrapped(t.pool.boolean(False)))
+        for path in self.states:
+            for i, value in enumerate(x):
+                t.store(path, i, value)
+        for path in self.outdated:
+            t.store(path, None, t.wrapped(t.pool.boolean(False)))
         argument = Argument("x", "{name}_real_t", pointer=True, size=self.n, doc="new state")
         return Function(
             "set_state",

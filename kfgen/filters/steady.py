@@ -7,11 +7,11 @@ from fractions import Fraction
 from kfgen.errors import SpecError
 from kfgen.filters import guards, linalg, process
 from kfgen.filters.base import CONST_KF, INPUTS, KF, FilterCode, sensor_argument
-from kfgen.filters.gate import gate
+from kfgen.filters.gate import gate, store_outcome
 from kfgen.filters.linalg import Vector
 from kfgen.filters.riccati import Gain, Rules, Scalar, steady
 from kfgen.filters.sensor import SensorCode, needs_inputs, total
-from kfgen.filters.state import StateCode, counts_gated
+from kfgen.filters.state import StateCode
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace, Value
@@ -103,7 +103,7 @@ class Steady:
         t.section("guards")
         if sensor.gate is not None:  # a far outlier may overflow nis and is gated all the same
             guards.finite(t, y)
-            gate(t, model, sensor, nis, None)
+            gate(t, model, [sensor], [nis], None)
         guards.finite(t, [nis, *free])
         if gain.floored:
             t.flag(t.wrapped(t.pool.boolean(True)), "REGULARIZED")
@@ -111,12 +111,8 @@ class Steady:
         for i, value in enumerate(x):
             if value.node is not prior[i].node:
                 t.store("kf.x", i, value)
-        if counts_gated(model, sensor):
-            t.store(f"kf.gate_count_{sensor.name}", None, t.wrapped(t.pool.integer(0)))
-        t.store("kf.nis", None, nis)
-        if model.spec.code.log_likelihood:
-            squares, logs = self._likelihood(t, gain.made, y)
-            t.store("kf.log_likelihood", None, (squares + logs) * Fraction(-1, 2))
+        squares, logs = self._likelihood(t, gain.made, y)
+        store_outcome(t, model, [sensor], nis, (squares + logs) * Fraction(-1, 2))
         doc = f"Take a measurement of {sensor.name} into account."
         return Function(f"update_{sensor.name}", arguments, schedule(t, taken | {"z", "u"}), doc)
 

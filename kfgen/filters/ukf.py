@@ -9,23 +9,23 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.filters import cloud, guards, process, rolled
-from kfgen.filters.base import DT, INPUTS, KF, Block, FilterCode
+from kfgen.filters.base import KF, Block
 from kfgen.filters.cloud import Private
 from kfgen.filters.dual import Dual, Evaluator
-from kfgen.filters.ekf import Ekf, Update
+from kfgen.filters.ekf import Ekf, Learnt, Update
 from kfgen.filters.gather import Gatherer, gatherer, noise_root
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector
 from kfgen.filters.noise import Given
 from kfgen.filters.numbers import is_zero
+from kfgen.filters.phases import Made, Phases
 from kfgen.filters.points import PointSet, point_set
 from kfgen.filters.process import Step
 from kfgen.filters.seeing import Seeing
 from kfgen.filters.sensor import Linearised
-from kfgen.filters.sequence import Updated
 from kfgen.filters.symmetric import Symmetric
 from kfgen.filters.unscented import whole_vector
-from kfgen.ir.program import Argument, Function
+from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
@@ -87,22 +87,19 @@ class Ukf(Ekf):
         text = f"{self.title}, {self.points.kind} points, {self.layout.title} covariance, {form}"
         return text + "".join(f", {key}" for key in options)
 
-    def code(self, taken: frozenset[str]) -> FilterCode:
-        self.privates: list[Function] = []
+    def private_functions(self, taken: frozenset[str]) -> list[Function]:
+        made: list[Function] = []
         self.f: Private | None = None
         if not self.simple:
             self.f = cloud.dynamics(self.model, self.carried, taken)
-            self.privates.append(self.f.function)
+            made.append(self.f.function)
         self.absorb: Function | None = None
         if self.loops and self.layout.factored and not self.simple:
             self.absorb = rolled.absorb(self.n, self.scalar.smallest, taken)
-            self.privates.append(self.absorb)
+            made.append(self.absorb)
         for seeing in self.seeing.values():
-            self.privates += seeing.functions(taken)
-        return super().code(taken)
-
-    def private_functions(self) -> list[Function]:
-        return self.privates
+            made += seeing.functions(taken)
+        return made
 
     def further_functions(self, taken: frozenset[str]) -> list[Function]:
         if not self.keeps:
@@ -119,19 +116,12 @@ class Ukf(Ekf):
 
     # predict -----------------------------------------------------------------------------------------
 
-    def predict(self, taken: frozenset[str]) -> Function:
+    def predicting(self, t: Trace, step: Step) -> Phases:
         """Points through f; x <- their mean, P <- their spread + Q + G Qw G^T of the noises that they do not carry."""
         if self.simple:
-            return super().predict(taken)
-        model, t = self.model, Trace(self.scalar.smallest)
-        arguments: list[Argument] = [KF]
-        if model.inputs:
-            arguments.append(INPUTS)
-            t.section("arguments")
-            guards.inputs(t, model.inputs)
-        if model.dt is None and model.spec.dt is not None:
-            arguments.append(DT)
-        step = process.step_length(t, model)
+            yield from super().predicting(t, step)
+            return
+        model = self.model
         prior = process.given(t, model, step)
         result = process.advance(t, model, prior, step, carried=self.carried)
         P0 = self.layout.load(t)
@@ -155,15 +145,10 @@ class Ukf(Ekf):
         guards.doubts(t, [*x, *doubtful, *tested])
         guards.finite(t, [*x, *evidence, *tested])
         guards.positive(t, failures)
+        yield Made(x, P)
         self.store(t, x, set(range(self.n)), P, after_predict=True)
         if self.keeps:
             self._keep(t, array, shift, free, x, limits)
-        process.store_time(t, model, step)
-        length = "a step of dt" if model.dt is None else f"one step of {float(model.dt):.6g} s"
-        if model.spec.dt is None:
-            length = "one step"
-        names = taken | {a.name for a in arguments}
-        return Function("predict", arguments, schedule(t, names), f"Advance the estimate by {length}.")
 
     @property
     def loops(self) -> bool:
@@ -334,14 +319,14 @@ class Ukf(Ekf):
 
     # update ------------------------------------------------------------------------------------------
 
-    def update(self, sensor: SensorModel, taken: frozenset[str], partial: bool = False) -> Function:
+    def updating(self, t: Trace, sensor: SensorModel, used: list[Value] | None) -> Phases:
         seeing = self.seeing[sensor.name]
         chosen = self.model.spec.filter
         several = len(sensor.h) > 1 and self.model.options.innovation_floor is not None
         whole = not chosen.sequential and (chosen.adaptive is not None or several)
         if chosen.sequential or (seeing.linear and not whole):
-            return super().update(sensor, taken, partial)
-        return whole_vector(self, seeing, taken, partial)
+            return super().updating(t, sensor, used)
+        return whole_vector(self, seeing, t, sensor, used)
 
     def skipped(self, sensor: SensorModel) -> tuple[str, ...]:
         return self.seeing[sensor.name].carried
@@ -356,8 +341,8 @@ class Ukf(Ekf):
     def spread(self, u: Update, linear: Linearised) -> Symmetric:
         return super().spread(u, linear) if self.seeing[u.sensor.name].linear else self._spread
 
-    def store_update(self, u: Update, x: list[Value], P: Covariance, judged: Updated, final: Updated) -> None:
-        super().store_update(u, x, P, judged, final)
+    def store_update(self, u: Update, x: list[Value], P: Covariance, learnt: Learnt) -> None:
+        super().store_update(u, x, P, learnt)
         if self.keeps:
             u.t.store("kf.kept", None, u.t.wrapped(u.t.pool.boolean(False)))
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from kfgen.filters import guards, linalg
 from kfgen.filters.ekf import Update
-from kfgen.filters.gate import chi2_threshold, gate
+from kfgen.filters.gate import chi2_threshold
 from kfgen.filters.gather import indefinite
 from kfgen.filters.layout import Covariance
 from kfgen.filters.linalg import Rows, Vector, plus, times
@@ -27,13 +27,13 @@ from kfgen.filters.numbers import (
     select,
     sqrt,
 )  # fmt: skip
+from kfgen.filters.phases import Judged, Made, Phases
 from kfgen.filters.seeing import Seeing, Seen
 from kfgen.filters.sensor import Linearised, SensorCode, decorrelated
 from kfgen.filters.sequence import Updated
 from kfgen.filters.symmetric import Symmetric
-from kfgen.ir.program import Function
-from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
+from kfgen.model.model import SensorModel
 from kfgen.quantiles import log_two_pi
 
 if TYPE_CHECKING:
@@ -92,11 +92,11 @@ def factored(
     return Factored(nu, columns, inverse, D, some, failures, nis)
 
 
-def whole_vector(ukf: Ukf, seeing: Seeing, taken: frozenset[str], partial: bool) -> Function:
+def whole_vector(
+    ukf: Ukf, seeing: Seeing, t: Trace, sensor: SensorModel, used: list[Value] | None
+) -> Phases:
     """The update of a sensor by the whole vector."""
-    model, sensor, layout = ukf.model, seeing.sensor, ukf.layout
-    t = Trace(ukf.scalar.smallest)
-    arguments, used = ukf.opening(t, sensor, partial)
+    model, layout = ukf.model, ukf.layout
     t.section("innovation")
     code = SensorCode(t, model, sensor, ukf.order, skipped=seeing.carried)
     u = Update(t, sensor, code, code.prior(), layout, used, ukf.adapted_R(sensor))
@@ -117,7 +117,7 @@ def whole_vector(ukf: Ukf, seeing: Seeing, taken: frozenset[str], partial: bool)
     guards.finite(t, [*sound, nis] if sensor.gate is None else sound)
     guards.doubts(t, [v for row in linear.R for v in row])
     guards.positive(t, [*failures, *first.failures])
-    gate(t, model, sensor, nis, used)
+    yield Judged(nis)
     P = u.P
     final = first
     if model.options.inflation is not None:
@@ -150,13 +150,10 @@ def whole_vector(ukf: Ukf, seeing: Seeing, taken: frozenset[str], partial: bool)
     if not layout.factored and not work.definite:
         failed += indefinite(P, ukf.n * ukf.scalar.epsilon)
     guards.positive(t, failed)
-    made = Updated(moved, P, nis, list(final.D), [], likelihood * Fraction(-1, 2), [])
-    ukf.store_update(u, x, P, made, made)
-    suffix, what = ("_masked", "the chosen components of a measurement") if partial else ("", "a measurement")
-    return Function(
-        f"update_{sensor.name}{suffix}", arguments, schedule(t, taken | {a.name for a in arguments}),
-        f"Take {what} of {sensor.name} into account.",
-    )  # fmt: skip
+    log_likelihood = likelihood * Fraction(-1, 2)
+    learnt = ukf.prepared(u, x, P, Updated(moved, P, nis, list(final.D), [], log_likelihood, []))
+    yield Made(x, P, nis, log_likelihood)
+    ukf.store_update(u, x, P, learnt)
 
 
 class _Whole:

@@ -110,6 +110,8 @@ class Block:
 class Trace:
     """The recording of one function."""
 
+    in_place = True  # what is loaded is what stands where it will be stored
+
     def __init__(self, smallest: Fraction | int = 0) -> None:
         self.smallest = smallest  # a number not above it counts as zero where it divides
         self.pool = _RecordingPool(self)
@@ -137,9 +139,9 @@ class Trace:
     def value(self, number: Value | Number) -> Value:
         return self.wrapped(self.node(number))
 
-    def field(self, path: str) -> Value:
+    def field(self, path: str, kind: str = REAL) -> Value:
         """A number that the function is given: `u.gyro`, `z.x`, `dt`, `kf.nis`."""
-        return self.wrapped(self.pool.make("field", (), path))
+        return self.wrapped(self.pool.make("field", (), path, kind))
 
     def element(self, path: str, index: int | Value) -> Value:
         """An element of an array that the function is given: `kf.x`, `kf.U`, `P`."""

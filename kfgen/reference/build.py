@@ -11,10 +11,10 @@ from kfgen.reference.ekf2 import Ekf2
 from kfgen.reference.filter import ReferenceFilter
 from kfgen.reference.iekf import Iekf
 from kfgen.reference.imm import ReferenceImm
-from kfgen.reference.mode_specs import mode_specs
 from kfgen.reference.model import Model
 from kfgen.reference.steady import Steady
 from kfgen.reference.ukf import Ukf
+from kfgen.spec.modes import mode_specs
 from kfgen.spec.types import Spec
 
 # filter type -> its algorithm

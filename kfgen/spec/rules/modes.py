@@ -33,6 +33,7 @@ def check(facts: Facts) -> None:
     _transition(facts, imm)
     _initial(facts, imm)
     _sensors(facts, imm)
+    _steady(facts, imm)
 
 
 def _probabilities(facts: Facts, entries: tuple[Expression, ...], place: Place, what: str) -> None:
@@ -109,6 +110,16 @@ def _sensors(facts: Facts, imm: Imm) -> None:
             kinds = [(a.kind, b.kind) for a, b in zip(own.components, other.components, strict=True)]
             if any(a != b for a, b in kinds):
                 facts.add(own.place, f"`kind` in {short(own.name)} differs between modes", "write the same in all")
+
+
+def _steady(facts: Facts, imm: Imm) -> None:
+    """A steady-state gain belongs to a covariance that no mixing changes: after a switch, when the spread between the
+    modes ought to raise it, such a mode would trust its mixed state as if nothing had happened."""
+    steady = [mode.filter for mode in imm.modes if mode.filter.gain == "steady"]
+    for place in dict.fromkeys(options.places.get("gain", options.place) for options in steady):
+        facts.add(
+            place, "`gain: steady` does not go with imm: mixing the modes changes their covariances", "remove `gain`"
+        )
 
 
 def _shape(sensors: tuple[Sensor, ...]) -> list[tuple[str, list[str]]]:
