@@ -56,6 +56,10 @@ def build(spec: Spec, scalar: str | None = None) -> Generated:
     notes = [code.description]
     if code.order != tuple(range(len(code.order))):
         notes.append("inner order: " + " ".join(code.model.states[i] for i in code.order))
+    for mode in code.modes:
+        inner = " ".join(code.model.states[i] for i in mode.order)
+        order = "" if mode.order == code.order else f"; inner order: {inner}"
+        notes.append(f"{mode.name}: {mode.description}{order}")
     notes += code.remarks
     return Generated(render(view), Summary(rows, view.ram, notes), code, view)
 

@@ -10,8 +10,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 import sympy
 
+from kfgen.emit import struct
 from kfgen.emit.printer import WIDTH, Printer
-from kfgen.filters.base import Block, FilterCode
+from kfgen.filters.base import FilterCode
 from kfgen.ir.count import operations
 from kfgen.ir.program import Argument, Flag, Function, Guard, walk
 from kfgen.ir.schedule import LIBRARY_NAMES
@@ -42,8 +43,6 @@ class Named:
     comment: str = ""
     value: str = ""
     index_name: str = ""
-    type: str = ""
-    dimension: str = ""
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,8 @@ class View:
     inputs: tuple[Named, ...]
     sensors: tuple[SensorView, ...]
     parameters: tuple[Named, ...]
-    fields: tuple[Named, ...]
+    modes: tuple[struct.Struct, ...]
+    fields: tuple[struct.Field, ...]
     statuses: tuple[Named, ...]
     functions: tuple[FunctionView, ...]
     constants: tuple[Data, ...]
@@ -161,7 +161,7 @@ class _ViewMaker:
             version=package_version(),
             sympy=sympy.__version__,
             sha256=spec.sha256,
-            ram=self.ram(),
+            ram=struct.ram(scalar, code.blocks, len(spec.parameters)),
             scalar=ScalarView(
                 scalar.name, scalar.c_type, scalar.helpers, scalar.literal(Fraction(0)), scalar.literal(Fraction(1)),
                 scalar.function("ceil"),
@@ -184,7 +184,8 @@ class _ViewMaker:
                 for s in spec.measurements
             ),
             parameters=self.aligned([Named(p.name, _about(p.unit, p.doc)) for p in spec.parameters], "name", 1),
-            fields=self.fields(),
+            modes=struct.modes(self.name, code.blocks),
+            fields=struct.fields(self.name, code.blocks, bool(spec.parameters)),
             statuses=tuple(
                 Named(name, f" /* {doc} */" if doc else "", value=f"0x{value:03x}u") for name, value, doc in STATUSES
             ),
@@ -211,40 +212,20 @@ class _ViewMaker:
             out.append(Named(r.name, f"{pad}/* {r.comment} */" if r.comment else "", index_name=r.index_name))
         return tuple(out)
 
-    def fields(self) -> tuple[Named, ...]:
-        real = f"{self.name}_real_t"
-        types = {"real": real, "uint32": "uint32_t", "bool": "bool"}
-        rows: list[Named] = []
-        for block in self.code.blocks:
-            if block.name == "nis" and self.spec.parameters:
-                rows.append(
-                    Named("parameters", "may be changed while the filter runs", type=f"{self.name}_parameters_t")
-                )
-            dimension = "" if block.size is None else f"[{block.size}]"
-            rows.append(Named(block.name, block.doc, type=types[block.kind], dimension=dimension))
-        width = max(len(r.type + r.name + r.dimension) for r in rows)
-        return tuple(
-            Named(r.name, " " * (width - len(r.type + r.name + r.dimension) + 1) + f"/* {r.comment} */",
-                  type=r.type, dimension=r.dimension)
-            for r in rows
-        )  # fmt: skip
-
-    def ram(self) -> int:
-        """sizeof of the struct, with natural alignment."""
-        size, align = 0, 1
-        blocks = list(self.code.blocks)
-        for block in [*blocks, *[Block(p.name, None, "") for p in self.spec.parameters]]:
-            each = {"real": self.scalar.size, "uint32": 4, "bool": 1}[block.kind]
-            size = -(-size // each) * each + each * (block.size or 1)
-            align = max(align, each)
-        return -(-size // align) * align
-
     def reference(self, names: list[str]) -> list[Data]:
         spec = self.spec
         out = []
         if self.code.order != tuple(range(len(names))):
             inner = ", ".join(names[i] for i in self.code.order)
             out.append(Data(title="order of the states inside U and D", lines=tuple(_fill(inner, 88))))
+        if self.code.modes:
+            lines = [line for mode in self.code.modes for line in _fill(f"{mode.name}: {mode.description}", 88)]
+            out.append(Data(title="modes", lines=tuple(lines)))
+        for mode in self.code.modes:
+            if mode.order != tuple(range(len(names))):
+                inner = ", ".join(names[i] for i in mode.order)
+                title = f"order of the states inside U and D of {mode.name}"
+                out.append(Data(title=title, lines=tuple(_fill(inner, 88))))
         if spec.dt is None:
             step = "the model knows no time"
         elif self.code.model.dt is not None:
@@ -268,8 +249,11 @@ class _ViewMaker:
     # functions ---------------------------------------------------------------------------------------
 
     def index_name(self, path: str, index: int) -> str | None:
-        if path in ("kf.x", "x") and index < len(self.spec.states):
-            return f"{self.NAME}_{self.spec.states[index].name.upper()}"
+        if path == "x" or (path.startswith("kf.") and path.endswith(".x")):
+            if index < len(self.spec.states):
+                return f"{self.NAME}_{self.spec.states[index].name.upper()}"
+        elif path == "kf.mu":
+            return f"{self.NAME}_MODE_{self.code.modes[index].name.upper()}"
         return None
 
     def function(self, f: Function) -> FunctionView:

@@ -23,6 +23,15 @@ class Block:
 
 
 @dataclass(frozen=True)
+class ModeNote:
+    """What a reader wants to know of a mode. order: inner position -> state, where the generator has chosen it."""
+
+    name: str
+    description: str
+    order: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class FilterCode:
     """A filter ready to print."""
 
@@ -36,6 +45,7 @@ class FilterCode:
     tables: Mapping[Table, str] = field(default_factory=dict)
     lookups: tuple[Constants, ...] = ()
     remarks: tuple[str, ...] = ()  # for the build's table
+    modes: tuple[ModeNote, ...] = ()  # of a bank
 
 
 KF = Argument("kf", "{name}_t", pointer=True, constant=False, doc="filter")

@@ -13,6 +13,7 @@ from kfgen.filters import process
 from kfgen.filters.base import FilterCode
 from kfgen.filters.ekf import Ekf
 from kfgen.filters.full import Full
+from kfgen.filters.imm import Imm
 from kfgen.filters.iterated import Iekf
 from kfgen.filters.layout import GainChange, Layout
 from kfgen.filters.linalg import Vector
@@ -29,10 +30,11 @@ from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import roots, walk
 from kfgen.ir.trace import Trace
 from kfgen.model import Model, build_model
+from kfgen.model.bank import build_bank
 from kfgen.scalars import Scalar
 from kfgen.spec.types import Spec
 
-_FILTERS: dict[str, Callable[[Model, Layout, Scalar], Any]] = {
+_FILTERS: dict[str, Callable[[Model, Layout, Scalar], Ekf]] = {
     "kf": Ekf, "ekf": Ekf, "iekf": Iekf, "ekf2": Ekf2, "ukf": Ukf,
 }  # fmt: skip
 
@@ -45,15 +47,29 @@ def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCod
     missing = unbuilt(spec)
     if missing:
         raise SpecError(missing)
+    if spec.imm is not None:
+        return _with_tables(_bank(spec, scalar).code(taken))
     model = build_model(spec)
     _check_measurements(model)
     if spec.filter.gain is not None:
         return _with_tables(Steady(model, scalar).code(taken))
-    return _with_tables(_FILTERS[spec.filter.type](model, _layout(model, scalar), scalar).code(taken))
+    return _with_tables(_single(model, scalar).code(taken))
 
 
-def _layout(model: Model, scalar: Scalar) -> Layout:
-    """How the covariance is kept, and in which order of the states."""
+def _single(model: Model, scalar: Scalar, order: list[int] | None = None) -> Ekf:
+    return _FILTERS[model.spec.filter.type](model, _layout(model, scalar, order), scalar)
+
+
+def _bank(spec: Spec, scalar: Scalar) -> Imm:
+    bank = build_bank(spec)
+    for model in bank.modes:
+        _check_measurements(model)
+    order = _common_order(bank.modes)
+    return Imm(bank, [_single(model, scalar, order) for model in bank.modes], scalar)
+
+
+def _layout(model: Model, scalar: Scalar, order: list[int] | None = None) -> Layout:
+    """How the covariance is kept, and in which order of the states, where that is not given."""
     n, chosen = len(model.states), model.spec.filter
     if chosen.covariance == "sqrt":
         return Sqrt(n)
@@ -61,7 +77,8 @@ def _layout(model: Model, scalar: Scalar) -> Layout:
         straight = list(range(n))
         return UD(straight, "bierman") if chosen.covariance == "ud" else Full(n, "standard", scalar.epsilon, straight)
     assert chosen.update is not None
-    order = _order(model)
+    if order is None:
+        order = _order((model,))
     if chosen.covariance == "ud":
         return UD(order, chosen.update, _gain_change(model, order))
     return Full(n, chosen.update, scalar.epsilon, order, _gain_change(model, list(range(n))))
@@ -111,20 +128,33 @@ def linearise_rows(t: Trace, model: Model, sensor: Any) -> list[list[Any]]:
     return code.linearise(code.prior()).H
 
 
-def _order(model: Model) -> list[int]:
+def _common_order(models: tuple[Model, ...]) -> list[int]:
+    """One order for all modes of a bank: factors of the same order mix for the least."""
+    if any(model.spec.filter.type == "ukf" and model.spec.filter.covariance == "ud" for model in models):
+        return list(range(len(models[0].states)))
+    return _order(models)
+
+
+def _order(models: tuple[Model, ...]) -> list[int]:
     """The cheapest inner order; the spec's where D is limited, since D depends on the order."""
-    n = len(model.states)
-    if any(v is not None for v in (*model.floors, *model.ceilings)) or n == 1:
+    n = len(models[0].states)
+    if n == 1 or any(v is not None for model in models for v in (*model.floors, *model.ceilings)):
         return list(range(n))
-    t = Trace()
-    step = process.step_length(t, model)
-    result = process.advance(t, model, process.given(t, model, step), step)
-    F = [{j for j in range(n) if not is_zero(result.F[i][j])} for i in range(n)]
-    noisy = {i for i in range(n) if any(not is_zero(q) for q in result.Q[i])}
-    measured = []
-    for sensor in model.sensors:
-        for row in linearise_rows(Trace(), model, sensor):
-            measured.append({j for j in range(n) if not is_zero(row[j])})
+    F: list[set[int]] = [set() for _ in range(n)]
+    noisy: set[int] = set()
+    measured: list[set[int]] = []
+    for model in models:
+        t = Trace()
+        step = process.step_length(t, model)
+        result = process.advance(t, model, process.given(t, model, step), step)
+        for i in range(n):
+            F[i] |= {j for j in range(n) if not is_zero(result.F[i][j])}
+        noisy |= {i for i in range(n) if any(not is_zero(q) for q in result.Q[i])}
+        for sensor in model.sensors:
+            for row in linearise_rows(Trace(), model, sensor):
+                touched = {j for j in range(n) if not is_zero(row[j])}
+                if model is models[0] or touched not in measured:
+                    measured.append(touched)
     return best_order(F, noisy, measured)
 
 

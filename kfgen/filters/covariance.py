@@ -22,6 +22,7 @@ class CovarianceCode:
     def __init__(self, model: Model, layout: Layout, epsilon: Fraction, outdated: str = "") -> None:
         """outdated: a field that says whether something belongs to the present covariance, false when that is set."""
         self.outdated = outdated
+        self.table = "order"  # the name of the table that holds the inner order
         self.model = model
         self.layout = layout
         self.order = layout.order
@@ -40,30 +41,45 @@ class CovarianceCode:
     def constants(self) -> dict[str, tuple[int, ...]]:
         """The inner order, where a table is needed for it."""
         straight = list(range(self.n))
-        return {} if self.order in (straight, straight[::-1]) else {"order": tuple(self.order)}
+        return {} if self.order in (straight, straight[::-1]) else {self.table: tuple(self.order)}
 
-    def _place(self, t: Trace) -> Callable[[Value], Value]:
+    def place(self, t: Trace) -> Callable[[Value], Value]:
         """From an inner position to the state of the spec."""
         if self.order == list(range(self.n)):
             return lambda i: i
         if self.order == list(reversed(range(self.n))):
             return lambda i: (self.n - 1) - i
-        return lambda i: t.wrapped(t.pool.make("element", (i.node,), f"{self.model.spec.name}_order", "int"))
+        return lambda i: t.wrapped(t.pool.make("element", (i.node,), f"{self.model.spec.name}_{self.table}", "int"))
 
     def get_covariance(self, taken: frozenset[str]) -> Function:
         """P, row-major, in the spec's order."""
         doc = "The covariance of the state, in the order of the states."
-        return get_matrix("covariance", "P", self.n, self.layout.get, self._place, doc, taken)
+        return get_matrix("covariance", "P", self.n, self.layout.get, self.place, doc, taken)
 
     def get_noise(self, kept: Kept, taken: frozenset[str]) -> Function:
         """The adapted Q, row-major, in the spec's order."""
         doc = "The additive process noise as it has been adapted, in the order of the states."
-        return get_matrix("Q", "Q", self.n, kept.get, self._place, doc, taken)
+        return get_matrix("Q", "Q", self.n, kept.get, self.place, doc, taken)
 
     def set_covariance(self, taken: frozenset[str]) -> Function:
         """Replace P after testing that it is positive semidefinite."""
-        t, n = Trace(), self.n
-        place = self._place(t)
+        t = Trace()
+        P, W = self.read(t)
+        t.section("store")
+        self.layout.put(t, P, W)
+        if self.outdated:
+            t.store(self.outdated, None, t.wrapped(t.pool.boolean(False)))
+        return Function(
+            "set_covariance",
+            [KF, covariance_argument(self.n)],
+            schedule(t, taken | {"x", "P"}),
+            "Replace the covariance; the state stays.",
+        )
+
+    def read(self, t: Trace) -> tuple[Array, Array]:
+        """The argument P in the inner order, and its factors, tested: upper triangles column by column."""
+        n = self.n
+        place = self.place(t)
         size = n * (n + 1) // 2
         P, W = t.array("p", size), t.array("w", size)
         t.section("the upper triangle, column by column")
@@ -81,23 +97,7 @@ class CovarianceCode:
             t.guard(~t.finite(value), "NOT_FINITE")
         t.section("factor it: a pivot is zero up to round-off, or positive")
         self._factor(t, P, W)
-        t.section("store")
-        self.layout.put(t, P, W)
-        if self.outdated:
-            t.store(self.outdated, None, t.wrapped(t.pool.boolean(False)))
-        argument = Argument(
-            "P",
-            "{name}_real_t",
-            pointer=True,
-            size=n * n,
-            doc="covariance, row-major; the upper triangle is read",
-        )
-        return Function(
-            "set_covariance",
-            [KF, argument],
-            schedule(t, taken | {"x", "P"}),
-            "Replace the covariance; the state stays.",
-        )
+        return P, W
 
     def _factor(self, t: Trace, P: Array, W: Array) -> None:
         """W: from the packed upper triangle of P to D on the diagonal and U above (Bierman 1977, III.4).
@@ -122,6 +122,11 @@ class CovarianceCode:
                     spot = column(i) + k
                     W[spot] = W[spot] - u * W[jj + k]
                 W[jj + i] = u
+
+
+def covariance_argument(n: int) -> Argument:
+    doc = "covariance, row-major; the upper triangle is read"
+    return Argument("P", "{name}_real_t", pointer=True, size=n * n, doc=doc)
 
 
 def get_matrix(

@@ -122,7 +122,17 @@ class Ekf:
             remarks=self.remarks(),
         )
 
+    def own_blocks(self) -> tuple[Block, ...]:
+        """The fields that are this filter's own where it is a mode of a bank."""
+        x = next(block for block in self.state.blocks() if block.name == "x")
+        return (x, *self.state.covariance, *self.state.extra)
+
     # what subclasses add
+
+    @property
+    def loops(self) -> bool:
+        """Whether the covariance is read in loops."""
+        return False
 
     @property
     def outdated(self) -> str:

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.base import Block
-from kfgen.filters.gather import cholesky
+from kfgen.filters.gather import cholesky, factor_columns
 from kfgen.filters.layout import Covariance, GainChange
 from kfgen.filters.linalg import Measurement, Rows, Vector
 from kfgen.filters.noise import Additive
@@ -147,6 +147,13 @@ class Full:
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
         return assembled(U, D)
+
+    def factors(self, P: Symmetric) -> tuple[Rows, Vector]:
+        dense = [[P[min(i, j), max(i, j)] for j in range(self.n)] for i in range(self.n)]
+        return linalg.udu_computed(dense, self.n * self.epsilon)
+
+    def columns(self, P: Symmetric) -> list[tuple[Vector, Number]]:
+        return factor_columns(*self.factors(P))
 
     def root(self, P: Symmetric, tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
         S, failures = cholesky(lambda i, j: P[i, j], self.n, tolerance)

@@ -11,6 +11,7 @@ from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector
 from kfgen.filters.noise import NEGATIVE, Additive
 from kfgen.filters.numbers import (
+    Number,
     assume_nonnegative,
     assume_positive,
     is_constant,
@@ -180,6 +181,12 @@ def columns_of(rows: Rows) -> list[Vector]:
     """The columns of an upper triangular matrix, as full vectors."""
     n = len(rows)
     return [[rows[i][j] if i <= j else 0 for i in range(n)] for j in range(n)]
+
+
+def factor_columns(U: Rows, D: Vector) -> list[tuple[Vector, Number]]:
+    """The columns of a unit upper triangular U with their weights."""
+    n = len(D)
+    return [([*(U[i][j] for i in range(j)), 1, *[0] * (n - j - 1)], D[j]) for j in range(n)]
 
 
 def root_of_factors(U: Rows, D: Vector) -> Rows:

@@ -89,6 +89,14 @@ class Layout(Protocol):
         """U D U^T (layouts that are factored)."""
         ...
 
+    def factors(self, P: Covariance) -> tuple[Rows, Vector]:
+        """U, D with U D U^T = P (layouts that are factored); fresh lists, since they are built upon."""
+        ...
+
+    def columns(self, P: Covariance) -> list[tuple[Vector, Number]]:
+        """P as a sum of d w w^T over columns (w, d)."""
+        ...
+
     def downdated(
         self, t: Trace, P: Covariance, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Covariance
     ) -> tuple[Covariance, Value]:

@@ -88,6 +88,18 @@ class Sqrt:
         t.section("roots")
         return root_of_factors(U, D)
 
+    def factors(self, P: Rows) -> tuple[Rows, Vector]:
+        n = self.n
+        U, D = linalg.zeros(n, n), [linalg.times(P[j][j], P[j][j]) for j in range(n)]
+        for j in range(1, n):
+            inverse = reciprocal(assume_nonnegative(P[j][j]))[1]
+            for i in range(j):
+                U[i][j] = linalg.times(P[i][j], inverse)
+        return U, [assume_nonnegative(d) for d in D]
+
+    def columns(self, P: Rows) -> list[tuple[Vector, Number]]:
+        return [(column, 1) for column in columns_of(P)]
+
     def root(self, P: Rows, tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
         # in the order of the spec's lower factor: its first column is the inner order's last
         return columns_of(P)[::-1], []

@@ -29,11 +29,14 @@ class StateCode:
     def __init__(
         self, model: Model, covariance: tuple[Block, ...], extra: tuple[Block, ...] = (),
         outdated: tuple[str, ...] = (), states: tuple[str, ...] = ("kf.x",),
+        sensors: Sequence[Sequence[SensorModel]] | None = None,
     ) -> None:
         """covariance: the fields that hold it; extra: what else the algorithm keeps. states: the fields that hold x.
 
         outdated: fields that say whether something of it belongs to the present state, false when that is set.
+        sensors: each as every mode of a bank has it.
         """
+        self.sensors = [(sensor,) for sensor in model.sensors] if sensors is None else sensors
         self.outdated = outdated
         self.states = states
         self.model = model
@@ -48,10 +51,10 @@ class StateCode:
         out = [Block("x", self.n, "state", initial=x0)]
         out += self.covariance
         out.append(Block("nis", None, "normalised innovation squared of the last update"))
-        for sensor in model.sensors:
-            if counts_gated(model, [sensor]):
-                doc = f"measurements of {sensor.name} refused in a row"
-                out.append(Block(f"gate_count_{sensor.name}", None, doc, kind="uint32"))
+        for every in self.sensors:
+            if counts_gated(model, every):
+                doc = f"measurements of {every[0].name} refused in a row"
+                out.append(Block(f"gate_count_{every[0].name}", None, doc, kind="uint32"))
         if model.spec.code.log_likelihood:
             out.append(Block("log_likelihood", None, "of the last update"))
         out += self.extra

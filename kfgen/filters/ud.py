@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.base import Block
-from kfgen.filters.gather import columns_of, root_of_factors
+from kfgen.filters.gather import columns_of, factor_columns, root_of_factors
 from kfgen.filters.layout import Covariance, GainChange
 from kfgen.filters.linalg import Measurement, Rows, Vector
 from kfgen.filters.noise import NEGATIVE, Additive
@@ -172,6 +172,12 @@ class UD:
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> tuple[Rows, Vector]:
         return U, D
+
+    def factors(self, P: tuple[Rows, Vector]) -> tuple[Rows, Vector]:
+        return [list(row) for row in P[0]], list(P[1])
+
+    def columns(self, P: tuple[Rows, Vector]) -> list[tuple[Vector, Number]]:
+        return factor_columns(*P)
 
     def root(self, P: tuple[Rows, Vector], tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
         return columns_of(root_of_factors(*P)), []

@@ -17,9 +17,6 @@ def unbuilt(spec: Spec) -> list[Mistake]:
     def place(key: str) -> Place:
         return filter_.places.get(key, filter_.place)
 
-    if spec.imm is not None:
-        refuse(spec.imm.place, "imm", "describe a single filter")
-        return out
     if spec.scalar not in ("float", "double"):
         refuse(spec.places.get("scalar", spec.place), f"scalar: {spec.scalar}", "use float or double")
     code = spec.code

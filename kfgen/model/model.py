@@ -70,6 +70,7 @@ class Model:
     dt: Fraction | None  # None: given at run time
     dt_limits: tuple[Fraction | None, Fraction | None] = (None, None)
     options: Options = field(default_factory=Options)
+    keeps_time: bool = False  # whether something outside of the model depends on t
     _partials: dict[Symbolic, tuple[tuple[Symbolic, Symbolic], ...]] = field(default_factory=dict, repr=False)
 
     @property
@@ -116,7 +117,7 @@ class Model:
         all_expressions = self.dynamics_expressions()
         for sensor in self.sensors:
             all_expressions += self.sensor_expressions(sensor)
-        return "t" in self.uses(*all_expressions)
+        return self.keeps_time or "t" in self.uses(*all_expressions)
 
 
 def build_model(spec: Spec) -> Model:

@@ -94,6 +94,7 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
             yield f"{lower}_get_R_{sensor.name}", f"the R of the sensor `{sensor.name}`", sensor.place
     for mode in spec.imm.modes if spec.imm else ():
         yield f"{upper}_MODE_{mode.name.upper()}", f"the index of the mode `{mode.name}`", mode.place
+        yield f"{lower}_mode_{mode.name}_t", f"the type of the mode `{mode.name}`", mode.place
     if spec.scalar.startswith("q"):
         yield from _scaled(spec, upper)
 

@@ -1,0 +1,67 @@
+"""Private functions of several filters: those that are equal are emitted once."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from kfgen.ir.nodes import Node
+from kfgen.ir.program import Function
+
+
+def shared(groups: list[tuple[str, list[Function]]]) -> list[Function]:
+    """The functions to emit, callees first. groups: (mode, its private functions in the order of their calls).
+
+    Functions that do the same get the same name; a name that several modes have for different things is followed by
+    that of the first mode that means this one.
+    """
+    versions: dict[str, dict[Any, list[tuple[str, Function]]]] = {}
+    order: list[Function] = []
+    known: dict[int, Any] = {}
+    for mode, functions in groups:
+        for function in functions:
+            key = _Key(known).of(function)
+            known[id(function)] = key
+            users = versions.setdefault(function.name, {}).setdefault(key, [])
+            if not users:
+                order.append(function)
+            users.append((mode, function))
+    for name, found in versions.items():
+        for users in found.values():
+            for _, function in users:
+                function.name = name if len(found) == 1 else f"{name}_{users[0][0]}"
+    return order
+
+
+class _Key:
+    """What a function does, as nested tuples that compare. known: keys of functions met before, by identity."""
+
+    def __init__(self, known: dict[int, Any]) -> None:
+        self.known = known
+        self.numbers: dict[int, int] = {}
+        self.nodes: list[Any] = []
+
+    def of(self, function: Function) -> Any:
+        body = tuple(self._value(s) for s in function.body)
+        arguments = tuple((a.name, a.type, a.pointer, a.constant, a.size) for a in function.arguments)
+        return (function.name, arguments, body, tuple(self.nodes))
+
+    def _value(self, value: Any) -> Any:
+        if isinstance(value, Node):
+            return ("node", self._node(value))
+        if isinstance(value, Function):
+            return ("function", self.known.get(id(value), id(value)))
+        if isinstance(value, list | tuple):
+            return tuple(self._value(v) for v in value)
+        if is_dataclass(value) and not isinstance(value, type):
+            return (type(value).__name__, *(self._value(getattr(value, f.name)) for f in fields(value)))
+        return value
+
+    def _node(self, node: Node) -> int:
+        """A number for a node: that of its place among those met so far."""
+        found = self.numbers.get(id(node))
+        if found is None:
+            key = (node.op, tuple(self._node(a) for a in node.args), node.data, node.kind)
+            found = self.numbers[id(node)] = len(self.nodes)
+            self.nodes.append(key)
+        return found
