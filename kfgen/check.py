@@ -141,7 +141,7 @@ def compare(
             ours, theirs = _made(kf, call), _made(ref, call)
             if coarse is not ref:
                 _made(coarse, call)
-                coarse.set_state(scales.rounded(coarse.x))
+                coarse.displace(scales.rounded)
             calls += 1
             if (ours ^ theirs) & ~Status.REGULARIZED:  # where a pivot is zero depends on the factorisation
                 text = f"{call[0]} of step {row + 1}: {describe(ours)}, reference {describe(theirs)}"
@@ -163,11 +163,16 @@ def compare(
 
 
 def _follow(ref: ReferenceFilter, *others: NativeFilter | ReferenceFilter) -> None:
-    """Give other filters the estimate of the reference."""
-    for other in others:
-        other.set_state(ref.x)
-        if ref.spec.filter.gain is None:
-            other.set_covariance(ref.P)
+    """Give other filters the estimate of the reference. All modes of a bank go on from the combined one, those of the
+    reference too; mu is the reference's."""
+    x = ref.x
+    P = ref.P if ref.spec.filter.gain is None else None
+    for each in (ref, *others) if ref.spec.imm is not None else others:
+        each.set_state(x)
+        if P is not None:
+            each.set_covariance(P)
+        if ref.spec.imm is not None:
+            each.mu = ref.mu  # type: ignore[misc]
 
 
 # a function's name ("predict" or a sensor), and its keywords

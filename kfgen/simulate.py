@@ -73,7 +73,7 @@ def _simulate(spec: Spec, steps: int, random: np.random.Generator, every: Mappin
     model = worlds[0].model
     t, dt = _times(spec, model, steps, random)
     u = _inputs(spec, model, steps, random)
-    modes = _mode_track(spec, model, steps, random)
+    modes = _mode_track(spec, model, dt, random)
     x = worlds[modes[0]].initial(random)
     run_time = spec.dt is not None and spec.dt.run_time
     truth = np.empty((steps, model.n))
@@ -223,14 +223,14 @@ def _inputs(spec: Spec, model: Model, steps: int, random: np.random.Generator) -
     return u
 
 
-def _mode_track(spec: Spec, model: Model, steps: int, random: np.random.Generator) -> list[int]:
-    """The mode in each row."""
+def _mode_track(spec: Spec, model: Model, dt: Array, random: np.random.Generator) -> list[int]:
+    """The mode in each row. dt (rows,): the step that leads to it."""
     if spec.imm is None:
-        return [0] * steps
-    M = np.array([[model.number(entry) for entry in row] for row in spec.imm.transition])
+        return [0] * len(dt)
     mu = np.array([model.number(entry) for entry in spec.imm.mu0])
     track = [int(random.choice(len(mu), p=mu / mu.sum()))]
-    while len(track) < steps:
-        row = M[track[-1]]
+    for step in dt[1:]:
+        row = np.array([model.number(entry, float(step)) for entry in spec.imm.transition[track[-1]]])
+        row = np.maximum(row, 0.0)
         track.append(int(random.choice(len(mu), p=row / row.sum())))
     return track

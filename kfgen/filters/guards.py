@@ -23,7 +23,7 @@ def finite(t: Trace, values: list[Value]) -> None:
 
 def positive(t: Trace, failures: list[Value]) -> None:
     """NOT_POSITIVE where one of the conditions holds."""
-    live = [f for f in failures if f.constant != 0]
+    live = list({f.node: f for f in failures if f.constant != 0}.values())
     if live:
         t.guard(reduce(or_, live), "NOT_POSITIVE")
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import sympy
+
 from kfgen.filters import guards, process
 from kfgen.filters.bank_covariance import BankCovariance
 from kfgen.filters.bank_trace import BankTrace, Scope
@@ -170,24 +172,22 @@ class Imm:
         return Function("predict", arguments, schedule(t, names), predict_doc(self.model))
 
     def transition(self, t: BankTrace, step: Step) -> list[list[Value]]:
-        """M (B, B), its rows normalised."""
+        """M (B, B); rows that do not sum to 1 by what they are, are normalised."""
         given = process.parameters_and_inputs(t, self.model, inputs=False)
         if step.dt is not None:
             given["dt"] = Dual(step.dt)
         evaluator = Evaluator(t, self.model, given)
-        rows = []
-        for row in self.bank.transition:
-            values = [evaluator.value(e) for e in row]
-            total = sum(values[1:], values[0])
-            if total.constant is None:
-                guards.finite(t, values)
-                for v in values:
-                    if v.constant is None:
-                        t.guard(v < 0, "NOT_POSITIVE", "a transition probability is negative")
-                t.guard(total <= 0, "NOT_POSITIVE", "a row of the transition matrix is zero")
-                assume_positive(total)
-            rows.append([v / total for v in values])
-        return rows
+        rows = [[evaluator.value(e) for e in row] for row in self.bank.transition]
+        sums = [sum(row[1:], row[0]) for row in rows]
+        exact = [sympy.expand(sum(row)) == 1 for row in self.bank.transition]
+        varying = [v for row in rows for v in row if v.constant is None]
+        guards.finite(t, varying)
+        empty = [total <= 0 for total, ok in zip(sums, exact, strict=True) if not ok]
+        guards.positive(t, [*(v < 0 for v in varying), *empty])
+        return [
+            row if ok else [v / assume_positive(total) for v in row]
+            for row, total, ok in zip(rows, sums, exact, strict=True)
+        ]
 
     def _mix(self, t: BankTrace, mode: Mode, scope: Scope, parts: list[Estimate], w: list[Number], own: int) -> None:
         """Have the mode start from its mixture; where none joins it, from its own estimate as it stands."""

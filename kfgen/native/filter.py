@@ -160,8 +160,16 @@ class NativeFilter:
 
     @property
     def mu(self) -> Array:
-        """The probabilities of the modes [modes] (imm only)."""
+        """The probabilities of the modes [modes] (imm only); may be set, x then follows at the next call."""
         return self._value.to_physical(self._field("mu"), self._units.one)
+
+    @mu.setter
+    def mu(self, mu: ArrayLike) -> None:
+        values = shaped(mu, (len(self.modes),), "mu")
+        raw = self._raw(values, self._units.one)
+        if raw is None:
+            raise ValueError("mu has to be finite")
+        self._kf.mu = raw.tolist()
 
     @property
     def modes(self) -> tuple[ModeView, ...]:

@@ -107,6 +107,10 @@ class Bank(Estimator):
         """mu stays; where the modes differ in x the combined covariance is P and their spread."""
         return self._changed(estimate, lambda algorithm, mode: algorithm.with_covariance(mode, P))
 
+    def reweighed(self, estimate: Estimate, mu: Vector) -> Estimate:
+        """With other probabilities (B) of the modes."""
+        return self._combined(mu / np.sum(mu), _bank(estimate).modes)
+
     def redrawn(self, estimate: Estimate) -> Estimate:
         return self._changed(estimate, lambda algorithm, mode: algorithm.redrawn(mode))
 

@@ -125,6 +125,10 @@ class ReferenceFilter:
         self._estimate = self.algorithm.placed(self._estimate, lambda x: self.model.wrap(new))
         return int(Status.OK)
 
+    def displace(self, change: Callable[[Vector], Vector]) -> None:
+        """x <- change(x), of every mode of a bank; as set_state, the covariance stays."""
+        self._estimate = self.algorithm.placed(self._estimate, lambda x: self.model.wrap(change(x)))
+
     def set_covariance(self, P: ArrayLike) -> int:
         """Sets P (n, n) from its upper triangle; NOT_FINITE and NOT_POSITIVE leave the filter as it was."""
         self._require_variable()

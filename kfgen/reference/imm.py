@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from kfgen.reference.algorithm import Estimate
 from kfgen.reference.bank import Bank, BankEstimate
 from kfgen.reference.dual import Matrix, Vector
@@ -16,7 +18,7 @@ class ReferenceImm(ReferenceFilter):
         x (n), P (n, n): of all modes together; sqrt_covariance: that P's, where a mode has `covariance: sqrt`.
         nis: the smallest of the modes' (of the last update, also of a gated one).
         log_likelihood: ln sum_j mu_j exp(l_j) of the last update that was made, mu before it.
-        mu (B): the probabilities of the modes. modes: their own estimates.
+        mu (B): the probabilities of the modes; may be set. modes: their own estimates.
 
     R and Q belong to the modes. set_state, set_covariance and redraw act on all of them, and leave mu.
     """
@@ -30,6 +32,10 @@ class ReferenceImm(ReferenceFilter):
     @property
     def mu(self) -> Vector:
         return self._state.mu.copy()
+
+    @mu.setter
+    def mu(self, mu: Vector) -> None:
+        self._estimate = self._bank.reweighed(self._estimate, np.array(mu, dtype=np.float64))
 
     @property
     def modes(self) -> tuple[ModeView, ...]:

@@ -95,9 +95,11 @@ class Model:
         self.x0 = self.wrap(np.array([self.number(state.init) for state in spec.states]))
         self.P0 = self._initial_covariance()
 
-    def number(self, expression: Expression) -> float:
-        """The value of an expression that may use constants, a fixed dt, and the parameters' spec values."""
+    def number(self, expression: Expression, dt: float | None = None) -> float:
+        """The value of an expression that may use constants, the parameters' spec values, and dt, fixed or given."""
         environment = self.scope.empty()
+        if dt is not None:
+            environment[self.scope.slots["dt"]] = dt
         for name, value in self.values.items():
             environment[self.scope.slots[name]] = value
         return value_of(self.scope.compile(expression)(environment))

@@ -258,8 +258,9 @@ IMM = Record(
         Key("modes", Table("mode", MODE, declares=True), "The modes, 2 to 8.", required=True),
         Key(
             "transition",
-            matrix("constant"),
-            "Row i: the probabilities of going from mode i to each mode; rows sum to 1.",
+            matrix("transition"),
+            "Row i: the probabilities of going from mode i to each mode; rows sum to 1, and are normalised where they "
+            "depend on dt or parameters.",
             required=True,
         ),
         Key("mu0", Items(CONSTANT, "mode probabilities"), "The initial mode probabilities.", "all equal"),

@@ -16,6 +16,7 @@ SCOPES: dict[str, frozenset[str]] = {
     "R": frozenset({"constant", "parameter", "state", "input", "definition", "fixed dt", "t"}),
     "residual": frozenset({"constant", "parameter", "state", "input", "definition", "fixed dt", "t", "z", "h"}),
     "psi": frozenset({"constant", "parameter", "fixed dt", "innovation"}),
+    "transition": frozenset({"constant", "parameter", "dt"}),
 }
 
 # The same in words, for messages and the reference.
@@ -29,6 +30,7 @@ SCOPE_WORDS: dict[str, str] = {
     "R": "constants, parameters, states, inputs, definitions, t and a fixed dt",
     "residual": "z, h, constants, parameters, states, inputs, definitions, t and a fixed dt",
     "psi": "e (the normalised innovation), constants, parameters and a fixed dt",
+    "transition": "constants, parameters and dt",
 }
 
 
