@@ -35,7 +35,7 @@ FILTERS = [
 def logs(kf, one, options: str):
     """The same log through both: predicts in a row, updates in a row, masks, outliers."""
     rng = np.random.default_rng(3)
-    for k in range(60):
+    for k in range(36):
         if k % 7 != 5:
             u = rng.normal(size=1)
             assert kf.predict(u, 0.1) == one.predict(u, 0.1) < Status.ERROR
@@ -200,15 +200,15 @@ def test_identity_transition_finds_the_model():
 
 def test_probabilities_stay_probabilities():
     kf, rng = build(IMM3), np.random.default_rng(6)
-    for k in range(3000):
+    for k in range(600):
         assert kf.predict() == 0
         if rng.random() < 0.7:
             assert kf.update("position", [rng.normal() * 10.0 ** rng.integers(-3, 7)]) == 0
         assert abs(np.sum(kf.mu) - 1.0) < 4e-16
         assert np.all(kf.mu >= 0.999e-9), k
-    for _ in range(20000):
-        kf.predict()
-    assert abs(np.sum(kf.mu) - 1.0) < 4e-16
+    for _ in range(1500):  # 0.9**270 is 5e-13; what every step added would show
+        assert kf.predict() == 0
+        assert abs(np.sum(kf.mu) - 1.0) < 4e-16
     np.testing.assert_allclose(kf.mu, [0.5, 0.5], rtol=1e-12)
 
 
