@@ -50,7 +50,7 @@ def test_equals_the_kalman_filter(kind, form, redraw):
     points = KINDS[kind].replace("}", f", redraw: {redraw}}}").replace("{, ", "{")
     kf, uf = reference(loads(text)), reference(loads(ukf(text, form, points)))
     rng = np.random.default_rng(5)
-    for _ in range(40):
+    for _ in range(20):
         u, z = rng.normal(size=1), rng.normal(size=2)
         assert kf.predict(u) == uf.predict(u) == 0
         np.testing.assert_allclose(uf.x, kf.x, rtol=1e-10, atol=1e-10)
@@ -89,7 +89,7 @@ def test_small_alpha_costs_digits_only(alpha, form):
     text = random_problem(3, n=4, m=2)
     kf, uf = reference(loads(text)), reference(loads(ukf(text, form, f"{{kind: merwe, alpha: {alpha}}}")))
     rng = np.random.default_rng(5)
-    for _ in range(40):
+    for _ in range(20):
         u, z = rng.normal(size=1), rng.normal(size=2)
         assert kf.predict(u) == uf.predict(u) == 0
         assert kf.update("s", z) == uf.update("s", z) == 0
@@ -136,7 +136,7 @@ def test_semidefinite(text, form, points):
     """Exact sensors and states, and such as repeat each other: the first component wins, as in a kf."""
     kf, uf = reference(loads(text)), reference(loads(ukf(text, form, points)))
     z = [3.0, 5.0]
-    for _ in range(30):
+    for _ in range(12):
         assert kf.update("s", z) == 0
         assert uf.update("s", z) & ~Status.REGULARIZED == 0
         np.testing.assert_allclose(uf.x, kf.x, rtol=1e-10, atol=1e-10)
@@ -170,7 +170,7 @@ def test_never_excited_state(form, points):
     text = text.replace("dynamics:", "  c: {init: 1e3, var: 4}\ndynamics:").replace("var: 0}", "var: 0.1}", 1)
     text = text.replace("  f: {a", "  Q: {a: 0.01}\n  f: {a").replace("b: {init: 0", "b: {init: 12.3")
     uf, rng = reference(loads(ukf(text, form, points))), np.random.default_rng(2)
-    for _ in range(200):
+    for _ in range(60):
         assert uf.predict() == 0
         assert uf.update("s", [uf.x[0] + rng.normal(), 12.3 + rng.normal()]) == 0
         assert uf.x[1] == 12.3
@@ -191,7 +191,7 @@ def test_continuous_linear_noise_inputs_and_densities():
         for points in ("{kind: merwe, alpha: 0.5}", "{kind: cubature}")
     ]
     rng = np.random.default_rng(8)
-    for _ in range(20):
+    for _ in range(10):
         u = rng.normal(size=2)
         assert {f.predict(u, 0.1) for f in (kf, *others)} == {0}
         assert {f.update("gnss", [0.1, 0.3], u) for f in (kf, *others)} == {0}

@@ -147,7 +147,7 @@ class Textbook:
             self.e[used] = measured[used] - self.transform(used)[0]
 
 
-def run(text, book, steps=120, jump=False):
+def run(text, book, steps=60, jump=False):
     kf, rng = reference(loads(text)), np.random.default_rng(6)
     truth, flags = np.array([1.0, 0.0]), []
     for k in range(steps):
