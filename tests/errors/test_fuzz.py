@@ -23,7 +23,7 @@ NASTY = [
 ]  # fmt: skip
 
 fuzz = settings(
-    max_examples=150,
+    max_examples=80,
     derandomize=True,
     deadline=None,
     database=None,
