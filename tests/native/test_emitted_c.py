@@ -173,10 +173,10 @@ def absent(tool: str) -> None:
     pytest.fail(f"no {tool}") if os.environ.get("CI") else pytest.skip(f"no {tool}")
 
 
-# as C++ in one form of each layout: the others spell nothing new
+# by other compilers than gcc in one form of each layout: the others spell nothing new
 @pytest.mark.parametrize(
     ("form", "compiler"),
-    [(f, c) for f in FORMS for c in COMPILERS if c in ("gcc", "clang") or f in ("ud-bierman", "full-joseph")],
+    [(f, c) for f in FORMS for c in COMPILERS if c == "gcc" or f in ("ud-bierman", "full-joseph")],
 )
 def test_clean(form, compiler, tmp_path):
     if shutil.which(compiler) is None:

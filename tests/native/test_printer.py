@@ -24,8 +24,8 @@ from kfgen.spec import loads
 from kfgen.status import Status
 
 # float: long enough to meet gates, limits and turns of angles; double differs in spelling only
-STEPS = {"float": 200, "double": 40}
-STEPS_OF = {"chain16": 4, "att": 25, "chain8": 50}  # the large ones repeat the same few patterns
+STEPS = {"float": 100, "double": 25}
+STEPS_OF = {"chain16": 3, "att": 12, "chain8": 20}  # the large ones repeat the same few patterns
 
 
 def cases(names: Iterable[str], double: Iterable[str]) -> list[Any]:
@@ -107,7 +107,7 @@ def test_c_is_the_program_but_for_libm(name, form, scalar):
     """Each call from the same bits: what differs is the last place of sin, exp and the like, and what follows."""
     twin = twin_of(name, form, scalar)
     worst = 0.0
-    for function, keywords in calls(name, 60):
+    for function, keywords in calls(name, 40):
         ours, theirs = twin.run(function, **keywords), compiled_call(twin.kf, function, keywords)
         assert ours == theirs
         worst = max(worst, twin.errors())
