@@ -1,7 +1,6 @@
 /* kfgen build beetle.yaml
  *
- * beetle: A dung beetle under a camera: it rolls its ball straight on, or it winds about.
- * Two modes that differ in how fast the course wanders; their probabilities tell which it is.
+ * beetle: a dung beetle under a camera, running straight or winding about
  *
  * Interacting multiple model of 2 modes, float
  *
@@ -23,7 +22,7 @@
  *       wrap
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * e316c3e10904553b4dbd85abe5779cf998b57e875ca878c12e2dd747b9979c26
+ * a45d7d6b047b1325c773c12a0713a78bda9da3ed0b0b25a78e2f425de052d0c0
  * This file and beetle.c are yours: use, change and ship them without condition.
  */
 #ifndef BEETLE_H_INCLUDED

@@ -1,7 +1,6 @@
 /* kfgen build maneuver.yaml
  *
- * maneuver: An aircraft that flies on, speeds up or turns, seen by a radar in range and bearing.
- * Three modes: constant velocity, constant acceleration along the course, coordinated turn.
+ * maneuver: an aircraft in three modes, seen by a radar
  *
  * Interacting multiple model of 3 modes, float
  *
@@ -24,7 +23,7 @@
  *       min, 14 select, 10 wrap
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * 021b5dd934b9c2df9a24e3580e4cabcb207defac38faa673e90fc7de9189bae1
+ * ff3d9dc94d172a62a220e382eed7543860b6d701bb7f1544d75363126a2e27b9
  * This file and maneuver.c are yours: use, change and ship them without condition.
  */
 #ifndef MANEUVER_H_INCLUDED

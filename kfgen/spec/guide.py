@@ -30,6 +30,10 @@ that is right lies in its chi-square band; the tests hold those that promise it 
 * `gain_limit`, `innovation_floor`, `variance_floor`, `variance_ceiling`: bounds for what must never happen. Where one
   acts P is larger than the model says, with a ceiling smaller.
 * `gain: steady`: a constant gain and no covariance at run time. P is that of the steady state, not of the first steps.
+* `imm`: several models at once, for a target that switches between them: a filter for each, mixed by the probability
+  that it was the other one's turn, and `mu`, the probability of each mode. Consistent where the modes cover what
+  happens. Modes should differ; more than three seldom help. A state that a mode does not use should fade in it
+  (`a: 0.5*a`), so that it is not stale when the mode that needs it takes over.
 
 `adaptive` is for a target that moves as the model does not say, or a start that is wrong: an innovation that is too
 large is then true, and P has to grow until it is believed. An outlier looks the same and is believed too: x jumps to

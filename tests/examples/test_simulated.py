@@ -117,3 +117,28 @@ def test_tracker_does_not_believe_a_fix_that_is_far_off(build):
     assert abs(kf.x[0] - ahead[0]) < 3 * math.sqrt(P[0, 0])  # 500 m away, moved by a metre or two
     assert kf.P[0, 0] > P[0, 0]  # and nothing is believed of it
     assert kf.update("fix", [math.nan, ahead[1]], mask=0b10) == Status.OK
+
+
+def test_maneuver_knows_what_the_aircraft_does(build):
+    """Cruise, speed up, cruise, turn: each mode is the most probable one while it lasts."""
+    kf = build("maneuver")
+    random = np.random.default_rng(2)
+    px, py, v, th = 8000.0, 6000.0, 120.0, -0.5
+    kf.set_state([px, py, v, th, 0, 0])
+    kf.set_covariance(np.diag([100, 100, 100, 0.1, 0.1, 1e-4]))
+    probability = []
+    for row in range(160):
+        a, w = (4.0 if 40 <= row < 70 else 0.0), (0.12 if 110 <= row < 140 else 0.0)
+        px += (v + a / 2) * math.cos(th + w / 2)
+        py += (v + a / 2) * math.sin(th + w / 2)
+        v, th = v + a, th + w
+        z = [math.hypot(px, py) + 20 * random.normal(), math.atan2(py, px) + 0.001 * random.normal()]
+        assert kf.predict() == Status.OK
+        assert kf.update("radar", z) < 0x100
+        probability.append(kf.mu)
+        assert math.hypot(kf.x[0] - px, kf.x[1] - py) < 120
+    mu = np.array(probability)
+    assert np.argmax(mu[20:40].mean(axis=0)) == 0
+    assert np.argmax(mu[50:70].mean(axis=0)) == 1
+    assert np.argmax(mu[120:140].mean(axis=0)) == 2
+    assert abs(math.remainder(kf.x[3] - th, 2 * math.pi)) < 0.1
