@@ -20,6 +20,8 @@
  *       15 wrap
  *   update_camera  142 mul, 118 add, 17 div, 7 compare, 2 exp, 4 log, 2 max, 1 min, 3 select, 4
  *       wrap
+ * Recommended with gcc, for these long functions without branches:
+ *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * a45d7d6b047b1325c773c12a0713a78bda9da3ed0b0b25a78e2f425de052d0c0

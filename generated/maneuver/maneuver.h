@@ -21,6 +21,8 @@
  *   predict       464 mul, 445 add, 6 div, 9 compare, 3 cos, 18 select, 3 sin, 13 wrap
  *   update_radar  340 mul, 319 add, 17 div, 3 sqrt, 3 atan2, 23 compare, 3 exp, 6 log, 3 max, 2
  *       min, 14 select, 10 wrap
+ * Recommended with gcc, for these long functions without branches:
+ *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * ff3d9dc94d172a62a220e382eed7543860b6d701bb7f1544d75363126a2e27b9

@@ -17,7 +17,7 @@ from kfgen.filters.bank_covariance import BankCovariance
 from kfgen.filters.bank_trace import BankTrace, Scope
 from kfgen.filters.base import KF, Block, FilterCode, ModeNote
 from kfgen.filters.dual import Dual, Evaluator
-from kfgen.filters.ekf import Ekf
+from kfgen.filters.ekf import LONG_FUNCTIONS, Ekf
 from kfgen.filters.gate import gate, smallest, store_outcome
 from kfgen.filters.mixing import Estimate, mixed, normalised, spread, transition
 from kfgen.filters.numbers import Number, assume_positive, select
@@ -97,6 +97,7 @@ class Imm:
             constants=self.covariance.constants(),
             remarks=tuple(remarks),
             modes=tuple(notes),
+            notes=LONG_FUNCTIONS if len(self.modes) * len(straight) >= 8 else (),
         )
 
     def redraw(self, taken: frozenset[str]) -> Function:
