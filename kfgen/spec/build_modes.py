@@ -6,7 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from kfgen.spec.problems import short
+from kfgen.spec.problems import SHARED_STATES, short
 from kfgen.spec.raw import Fields, entries, matrix
 from kfgen.spec.tree import Expression, Number
 from kfgen.spec.types import Imm, Mode, Spec, State
@@ -78,7 +78,7 @@ def _states(builder: Builder, spec: Spec, f: Fields) -> tuple[State, ...]:
                 builder.problems.add(
                     written.place,
                     f"the state {short(state.name)} is missing",
-                    "a mode that gives `states` gives init and std or var of each",
+                    SHARED_STATES,
                 )
             found.append(replace(state, variance=builder.bad(state.place)))
             continue

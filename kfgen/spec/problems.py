@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from kfgen.errors import Mistake, Place, SpecError
 
+SHARED_STATES = "all modes share `states`; give a mode the full list and leave unused ones constant"
 LIMIT = 200  # more lines than this help nobody, and a hostile file must not fill the terminal
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from kfgen.errors import Place
 from kfgen.spec.lexer import positions
 from kfgen.spec.names import wrong_name
-from kfgen.spec.problems import LIMIT, did_you_mean, short, suggestion
+from kfgen.spec.problems import LIMIT, SHARED_STATES, did_you_mean, short, suggestion
 from kfgen.spec.raw import Path, Written
 from kfgen.spec.shapes import SCOPE_WORDS, SCOPES
 from kfgen.spec.tree import Expression, names
@@ -247,7 +247,7 @@ class Scopes:
         states = [s.name for s in self.spec.states]
         sensors = {s.name: [c.name for c in s.components] for s in self.spec.measurements}
         initialize = self.spec.initialize
-        for reference, word, _ in self.walker.references:
+        for reference, word, path in self.walker.references:
             known: list[str] = []
             of = reference.of
             if of == "state":
@@ -259,6 +259,8 @@ class Scopes:
                 known = sensors.get(initialize.sensor, []) if initialize else []
             if known and word.text not in known and word.text not in self.doubtful:
                 hint = did_you_mean(word.text, known, f"{reference.of}s")
+                if path[:2] == ("imm", "modes") and "states" in path and not hint.startswith("did you mean"):
+                    hint = SHARED_STATES
                 self.problems.add(word.place, f"there is no {of} {short(word.text)}", hint)
 
 

@@ -22,7 +22,7 @@ def check(facts: Facts) -> None:
         _consider(facts, model)
         if chosen.type == "kf":
             _linear(facts, model)
-        if chosen.gain == "steady":
+        if chosen.gain == "steady" and facts.spec.imm is None:
             _steady(facts, model)
         if chosen.adapt_R is not None:
             for sensor in model.measurements:
