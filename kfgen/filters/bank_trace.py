@@ -52,10 +52,10 @@ class BankTrace(Trace):
         yield self.captured
         self.captured = None
 
-    def materialise(self, scope: Scope) -> None:
-        """Put the values that a mode is given into local arrays, which loops can read."""
+    def materialise(self, scope: Scope, fields: Mapping[str, Mapping[int, Value]]) -> None:
+        """Put values that a mode is given into local arrays, which loops can read."""
         with self.of(scope):
-            for path, values in scope.given.items():
+            for path, values in fields.items():
                 array = self.array(path.removeprefix("kf."), len(values))
                 for index, value in values.items():
                     array[index] = value

@@ -130,8 +130,8 @@ class Ekf:
     # what subclasses add
 
     @property
-    def loops(self) -> bool:
-        """Whether the covariance is read in loops."""
+    def predicts_in_loops(self) -> bool:
+        """Whether a prediction reads the covariance in loops."""
         return False
 
     @property

@@ -202,8 +202,8 @@ class Imm:
             with t.capture() as captured:
                 mode.filter.layout.store(t, P, mode.filter.names, after_predict=False)
             scope.given = {"kf.x": dict(enumerate(x)), **captured}
-        if mode.filter.loops:
-            t.materialise(scope)
+        if mode.filter.predicts_in_loops:
+            t.materialise(scope, captured)
 
     # update ------------------------------------------------------------------------------------------
 

@@ -156,6 +156,10 @@ class Ukf(Ekf):
         many = self.n >= rolled.FROM and self.model.spec.code.unroll != "full"
         return many and not self.own and self.set.extra >= 0
 
+    @property
+    def predicts_in_loops(self) -> bool:
+        return self.loops and not self.simple
+
     def scatter(
         self, t: Trace, P: Covariance, noise: Rows, points: PointSet, array: Array, stored: bool = True
     ) -> list[Value]:
