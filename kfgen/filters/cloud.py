@@ -18,7 +18,7 @@ from kfgen.filters.linalg import Vector, plus, times
 from kfgen.filters.numbers import is_zero, select
 from kfgen.filters.points import PointSet
 from kfgen.ir.nodes import Node
-from kfgen.ir.program import Argument, Function
+from kfgen.ir.program import Argument, Call, Function, Statement, roots, walk
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
@@ -45,15 +45,19 @@ class Private:
         return out
 
 
-def given_for(model: Model, used: set[str], step: bool) -> tuple[list[Argument], list[str]]:
-    arguments: list[Argument] = []
-    if used & {name for name, _ in model.parameters} or "t" in used:
-        arguments.append(CONST_KF)
-    if used & set(model.inputs):
-        arguments.append(INPUTS)
-    if step and model.dt is None:
-        arguments.append(_STEP)
-    return arguments, [a.name for a in arguments]
+def given_for(body: list[Statement]) -> list[Argument]:
+    """What a scheduled body reads of the filter, the inputs and the step."""
+    read: set[str] = set()
+    for statement in walk(body):
+        if isinstance(statement, Call):
+            read |= {a for a in statement.args if isinstance(a, str)}
+        stack = roots(statement)
+        while stack:
+            node = stack.pop()
+            if node.op in ("field", "element"):
+                read.add(str(node.data).partition(".")[0])
+            stack += node.args
+    return [a for a in (CONST_KF, INPUTS, _STEP) if a.name in read]
 
 
 def _duals(t: Trace, model: Model, x: list[Value], noises: dict[str, Value], used: set[str]) -> dict[str, Dual]:
@@ -90,7 +94,6 @@ def dynamics(model: Model, carried: tuple[str, ...], taken: frozenset[str]) -> P
     """x <- f(x, u, w) in place, x (n + q) with the carried noises behind the states."""
     t, n = Trace(), len(model.states)
     used = model.uses(*model.f)
-    arguments, given = given_for(model, used, model.spec.dt is not None)
     noises = {w.name: t.zero for w in model.noises}
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("x", n + k), name)
@@ -102,18 +105,21 @@ def dynamics(model: Model, carried: tuple[str, ...], taken: frozenset[str]) -> P
         if value.node is not t.element("x", i).node:
             t.store("x", i, value)
     out = Argument("x", "{name}_real_t", pointer=True, constant=False, size=n + len(carried))
-    function = Function(
-        "f", [*arguments, out], schedule(t, taken | {"kf", "u", "step", "x"}),
-        "x <- f(x, u, w), in place", returns="void", private=True,
-    )  # fmt: skip
-    return Private(function, given)
+    body = schedule(t, taken | {"kf", "u", "step", "x"})
+    return private("f", body, [out], "x <- f(x, u, w), in place")
+
+
+def private(name: str, body: list[Statement], arrays: list[Argument], doc: str) -> Private:
+    """A private function that is given what its body reads, and arrays."""
+    arguments = given_for(body)
+    function = Function(name, [*arguments, *arrays], body, doc, returns="void", private=True)
+    return Private(function, [a.name for a in arguments])
 
 
 def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], taken: frozenset[str]) -> Private:
     """z = h(x, e), x (n + q) with the carried noises behind the states."""
     t, n = Trace(), len(model.states)
     used = model.uses(*sensor.h)
-    arguments, given = given_for(model, used, False)
     noises = {w.name: t.zero for w in sensor.noises}
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("x", n + k), name)
@@ -122,11 +128,8 @@ def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], tak
         t.store("z", i, evaluator.value(e))
     point = Argument("x", "{name}_real_t", pointer=True, size=n + len(carried))
     out = Argument("z", "{name}_real_t", pointer=True, constant=False, size=len(sensor.h))
-    function = Function(
-        f"h_{sensor.name}", [*arguments, point, out], schedule(t, taken | {"kf", "u", "x", "z"}),
-        f"what {sensor.name} measures at x", returns="void", private=True,
-    )  # fmt: skip
-    return Private(function, given)
+    body = schedule(t, taken | {"kf", "u", "x", "z"})
+    return private(f"h_{sensor.name}", body, [point, out], f"what {sensor.name} measures at x")
 
 
 def fill(t: Trace, cloud: Array, points: PointSet, columns: list[Vector]) -> None:

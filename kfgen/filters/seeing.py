@@ -110,8 +110,6 @@ class Seeing:
         x = [t.name(t.element("x", i), name) for i, name in enumerate(model.states)]
         point, z = t.array("point", self.stride), t.array("z", m)
         store = None if points.theta == 0 else t.array("dz", len(points.rows) * m)
-        used = model.uses(*sensor.h) | cloud.residual_uses(model, sensor)
-        arguments, given = cloud.given_for(model, used, False)
         call = self.h.arguments(None)
         middle = [t.element("middle", i) if self.recalls and points.centre else t.zero for i in range(n)]
         for i in range(self.stride):
@@ -170,13 +168,9 @@ class Seeing:
         sizes = [("x", n, True), *([("middle", n, True)] if self.recalls and points.centre else []),
                  ("cloud", len(points.rows) * self.stride, True), ("seen", self.size, False)]  # fmt: skip
         arrays = [Argument(name, "{name}_real_t", pointer=True, constant=c, size=s) for name, s, c in sizes]
-        function = Function(
-            f"{'recall' if self.recalls else 'see'}_{sensor.name}", [*arguments, *arrays],
-            schedule(t, taken | {"kf", "u", "x", "z", "middle", "cloud", "seen"}),
-            f"what the points predict of {sensor.name}: mean, covariance, covariances with the state",
-            returns="void", private=True,
-        )  # fmt: skip
-        return Private(function, given)
+        body = schedule(t, taken | {"kf", "u", "x", "z", "middle", "cloud", "seen"})
+        doc = f"what the points predict of {sensor.name}: mean, covariance, covariances with the state"
+        return cloud.private(f"{'recall' if self.recalls else 'see'}_{sensor.name}", body, arrays, doc)
 
     # in the update -----------------------------------------------------------------------------------
 
