@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from kfgen.ir.nodes import Node, Table
+from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
     Assign,
     Call,
@@ -34,7 +34,7 @@ class Printer:
     """
 
     def __init__(self, prefix: str, scalar: Scalar, index_name: Callable[[str, int], str | None],
-                 tables: dict[Table, str], has_flags: bool = False) -> None:  # fmt: skip
+                 tables: Mapping[Table | Constants, str], has_flags: bool = False) -> None:  # fmt: skip
         self.prefix = prefix
         self.scalar = scalar
         self.index_name = index_name
@@ -66,7 +66,7 @@ class Printer:
             case "real":
                 return f"({self.scalar.c_type}){e(node.args[0], _ATOM)}", _UNARY
             case "lookup":
-                return f"{self.prefix}_{node.data.name}[{e(node.args[0])}]", _ATOM
+                return f"{self.tables[node.data]}[{e(node.args[0])}]", _ATOM
             case "bit":
                 path, place = node.data
                 return f"({self._path(path)} & 0x{1 << place:x}u) != 0u", _RELATION

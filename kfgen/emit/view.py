@@ -14,6 +14,7 @@ from kfgen.emit import struct
 from kfgen.emit.printer import WIDTH, Printer
 from kfgen.filters.base import FilterCode
 from kfgen.ir.count import operations
+from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import Argument, Flag, Function, Guard, walk
 from kfgen.ir.schedule import LIBRARY_NAMES
 from kfgen.scalars import Scalar
@@ -141,7 +142,8 @@ class _ViewMaker:
         self.name = self.spec.name
         self.NAME = self.name.upper()
         self.helpers: set[str] = set()
-        self.tables = {table: f"{self.name}_{label}" for table, label in code.tables.items()}
+        labels: list[tuple[Table | Constants, str]] = [*code.tables.items(), *code.lookups.items()]
+        self.tables = {table: f"{self.name}_{label}" for table, label in labels}
 
     def make(self) -> View:
         spec, code, scalar = self.spec, self.code, self.scalar
@@ -321,8 +323,9 @@ class _ViewMaker:
         for lookup in self.code.lookups:
             text = ", ".join(self.scalar.literal(v) for v in lookup.numbers)
             lines = tuple(_fill(text, WIDTH - 6))
-            out.append(Data(name=f"{self.name}_{lookup.name}", size=len(lookup.numbers), lines=lines))
-        for table, name in self.tables.items():
+            out.append(Data(name=self.tables[lookup], size=len(lookup.numbers), lines=lines))
+        for table in self.code.tables:
+            name = self.tables[table]
             for suffix, values in (("x", table.starts()), ("y", table.values()), ("slope", table.slopes())):
                 text = ", ".join(self.scalar.literal(v) for v in values)
                 out.append(Data(name=f"{name}_{suffix}", size=len(values), lines=tuple(_fill(text, WIDTH - 6))))

@@ -43,7 +43,7 @@ class FilterCode:
     notes: tuple[str, ...] = ()
     constants: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  # static const tables of indices
     tables: Mapping[Table, str] = field(default_factory=dict)
-    lookups: tuple[Constants, ...] = ()
+    lookups: Mapping[Constants, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()  # for the build's table
     modes: tuple[ModeNote, ...] = ()  # of a bank
 

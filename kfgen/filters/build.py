@@ -21,6 +21,7 @@ from kfgen.filters.numbers import is_zero, select
 from kfgen.filters.order import best_order
 from kfgen.filters.second import Ekf2
 from kfgen.filters.sensor import SensorCode
+from kfgen.filters.shared import unused
 from kfgen.filters.sqrt import Sqrt
 from kfgen.filters.steady import Steady
 from kfgen.filters.ud import UD
@@ -47,6 +48,7 @@ def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCod
     missing = unbuilt(spec)
     if missing:
         raise SpecError(missing)
+    taken |= {f"{spec.name}_{word}" for word in _private_words(spec, scalar)}
     if spec.imm is not None:
         return _with_tables(_bank(spec, scalar).code(taken))
     model = build_model(spec)
@@ -158,10 +160,18 @@ def _order(models: tuple[Model, ...]) -> list[int]:
     return best_order(F, noisy, measured)
 
 
+def _private_words(spec: Spec, scalar: Scalar) -> set[str]:
+    """What follows the filter's name in the names of its helpers, private functions and tables."""
+    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb"}
+    words |= {f"{kind}_{sensor.name}" for kind in ("h", "see", "recall") for sensor in spec.measurements}
+    modes = spec.imm.modes if spec.imm else ()
+    return words | {f"{word}_{mode.name}" for word in words for mode in modes}
+
+
 def _with_tables(code: FilterCode) -> FilterCode:
     """Number the tables that the functions use, in the order of their first use."""
     found: dict[Table, str] = {}
-    lookups: dict[Constants, None] = {}
+    lookups: dict[Constants, str] = {}
     for function in code.functions:
         for statement in walk(function.body):
             stack = list(reversed(roots(statement)))
@@ -169,7 +179,7 @@ def _with_tables(code: FilterCode) -> FilterCode:
                 node = stack.pop()
                 if isinstance(node.data, Table):
                     found.setdefault(node.data, f"table{len(found)}")
-                if isinstance(node.data, Constants):
-                    lookups[node.data] = None
+                if isinstance(node.data, Constants) and node.data not in lookups:
+                    lookups[node.data] = unused(node.data.name, set(lookups.values()))
                 stack += reversed(node.args)
-    return replace(code, tables=found, lookups=tuple(lookups))
+    return replace(code, tables=found, lookups=lookups)

@@ -13,7 +13,7 @@ def shared(groups: list[tuple[str, list[Function]]]) -> list[Function]:
     """The functions to emit, callees first. groups: (mode, its private functions in the order of their calls).
 
     Functions that do the same get the same name; a name that several modes have for different things is followed by
-    that of the first mode that means this one.
+    that of the first mode that means this one, and by a number where that is taken.
     """
     versions: dict[str, dict[Any, list[tuple[str, Function]]]] = {}
     order: list[Function] = []
@@ -26,11 +26,25 @@ def shared(groups: list[tuple[str, list[Function]]]) -> list[Function]:
             if not users:
                 order.append(function)
             users.append((mode, function))
+    taken = set(versions)
     for name, found in versions.items():
+        if len(found) == 1:
+            continue
         for users in found.values():
+            own = unused(f"{name}_{users[0][0]}", taken)
+            taken.add(own)
             for _, function in users:
-                function.name = name if len(found) == 1 else f"{name}_{users[0][0]}"
+                function.name = own
     return order
+
+
+def unused(name: str, taken: set[str]) -> str:
+    """The name, or the first of name_2, name_3, ... that is not taken."""
+    found, count = name, 1
+    while found in taken:
+        count += 1
+        found = f"{name}_{count}"
+    return found
 
 
 class _Key:
