@@ -49,9 +49,10 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
     parts = [first, *(i for i in range(count) if i != first)]
     parts = [i for i in parts if not is_zero(weights[i])]
     base: list[Value] = list(states[parts[0]])
+    straight = sorted(parts)
     for k, period in enumerate(model.periods):
-        if period is not None and len(parts) > 2:  # of two, each is as good as the other
-            base[k] = t.name(_heaviest([states[i][k] for i in parts], [weights[i] for i in parts]),
+        if period is not None and len(parts) > 1:
+            base[k] = t.name(_heaviest([states[i][k] for i in straight], [weights[i] for i in straight]),
                              f"{model.states[k]}_base")  # fmt: skip
     deltas: list[Vector] = []
     for i in parts:
@@ -78,7 +79,7 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
 
 
 def _heaviest(values: list[Value], weights: list[Number]) -> Value:
-    """The value of the largest weight."""
+    """The value of the largest weight, the first of equals."""
     value, weight = values[0], weights[0]
     for v, w in zip(values[1:], weights[1:], strict=True):
         value, weight = select(w > weight, v, value), select(w > weight, w, weight)
