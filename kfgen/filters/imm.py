@@ -60,6 +60,7 @@ class Imm:
         self.bank = bank
         self.model = bank.head
         self.scalar = scalar
+        self.lively = bank.lively(scalar.smallest)
         self.modes = [Mode(name, f, f.own_blocks()) for name, f in zip(bank.names, filters, strict=True)]
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
         fields = [
@@ -109,7 +110,7 @@ class Imm:
 
     def _mu(self, t: Trace) -> list[Value]:
         mu = [t.name(t.element("kf.mu", i), f"mu_{mode.name}") for i, mode in enumerate(self.modes)]
-        if self.bank.lively:
+        if self.lively:
             for value in mu:
                 assume_positive(value)
         return mu
@@ -254,7 +255,7 @@ class Imm:
             logs.append(t.name(one.log_likelihood, f"l_{mode.name}"))
         best, alive = logs[0], mu[0] > 0
         for value, m in zip(logs[1:], mu[1:], strict=True):
-            if self.bank.lively:
+            if self.lively:
                 best = t.function("max", best, value)
             else:
                 best = select((m > 0) & (~alive | (value > best)), value, best)
@@ -262,7 +263,7 @@ class Imm:
         best = t.name(best, "l_best")
         guards.finite(t, [best])
         terms = [m * t.function("exp", value - best) for m, value in zip(mu, logs, strict=True)]
-        if not self.bank.lively:
+        if not self.lively:
             terms = [select(m > 0, term, 0) for m, term in zip(mu, terms, strict=True)]
         total = assume_positive(t.name(sum(terms[1:], terms[0]), "mu_sum"))
         guards.finite(t, [total])

@@ -23,7 +23,7 @@ class BankModel:
     """B modes over the same n states.
 
     head: what all have in common, with the combined x0. transition: (B, B), row i from mode i, as written. sensors:
-    each sensor as every mode has it. lively: mu stays positive whatever happens.
+    each sensor as every mode has it.
     """
 
     head: Model
@@ -37,11 +37,12 @@ class BankModel:
     def sensors(self) -> tuple[tuple[SensorModel, ...], ...]:
         return tuple(zip(*(model.sensors for model in self.modes), strict=True))
 
-    @property
-    def lively(self) -> bool:
-        """After a prediction mu_j >= min_i M_ij, after an update mu_j >= mu_floor, but for normalising."""
-        constant = [[e.is_number and e > 0 for e in row] for row in self.transition]
-        return self.mu_floor > 0 and all(m > 0 for m in self.mu0) and all(map(all, constant))
+    def lively(self, smallest: Fraction) -> bool:
+        """Whether mu stays above a number whatever happens: after a prediction mu_j >= min_i M_ij, after an update
+        mu_j >= mu_floor, but for normalising."""
+        least = 2 * len(self.modes) * sympy.Rational(smallest.numerator, smallest.denominator)
+        constant = all(e.is_number and e > least for row in self.transition for e in row)
+        return constant and all(m > least for m in (*self.mu0, self.mu_floor))
 
 
 def build_bank(spec: Spec) -> BankModel:
