@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import reduce
+from operator import or_
 
-from kfgen.ir.program import Function
+from kfgen.ir.program import Function, Store
 from kfgen.ir.trace import Array, Trace, Value, Variable
 
 
@@ -35,7 +37,7 @@ class BankTrace(Trace):
         super().__init__(smallest)
         self.scope: Scope | None = None
         self.captured: dict[str, dict[int, Value]] | None = None
-        self._later: list[tuple[Value, str, str]] = []
+        self._later: list[tuple[Scope, Value, str]] = []
         self._locals: set[str] = set()
 
     @contextmanager
@@ -64,8 +66,8 @@ class BankTrace(Trace):
     def settle(self) -> None:
         """End with the NOT_POSITIVE that a mode has met: after the NOT_FINITE of any."""
         later, self._later = self._later, []
-        for condition, status, why in later:
-            super().guard(condition, status, why)
+        for _, condition, why in later:
+            super().guard(condition, "NOT_POSITIVE", why)
 
     # what a mode does --------------------------------------------------------------------------------
 
@@ -95,11 +97,16 @@ class BankTrace(Trace):
             return  # it stands there already
         super().store(path, index, value)
 
-    def guard(self, condition: Value, status: str, why: str = "", before: list[object] | None = None) -> None:  # type: ignore[override]
-        if self.scope is not None and status == "NOT_POSITIVE" and self.depth == 0 and not before:
-            self._later.append((condition, status, why))
-        else:
-            super().guard(condition, status, why, before)  # type: ignore[arg-type]
+    def guard(self, condition: Value, status: str, why: str = "", before: list[Store] | None = None) -> None:
+        scope = self.scope
+        if scope is not None and not before:
+            if status == "NOT_POSITIVE" and self.depth == 0:
+                self._later.append((scope, condition, why))
+                return
+            met = [c for owner, c, _ in self._later if owner is scope]
+            if met and status == "NOT_FINITE":  # of a mode the first error counts, whatever comes of it
+                condition = condition & ~reduce(or_, met)
+        super().guard(condition, status, why, before)
 
     def section(self, text: str) -> None:
         super().section(text if self.scope is None else f"{self.scope.mode}: {text}")
