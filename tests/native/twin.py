@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -30,13 +31,7 @@ class Twin(Program):
                 self.memory.numbers[name] = value
 
     def fields(self) -> dict[str, Any]:
-        out: dict[str, Any] = {}
-        for name, value in self.kf.raw.items():
-            if isinstance(value, dict):
-                out |= {f"kf.{name}.{key}": each for key, each in value.items()}
-            else:
-                out[f"kf.{name}"] = value
-        return out
+        return dict(_flat("kf", self.kf.raw))
 
     def differences(self) -> list[str]:
         """The fields that are not the same bits."""
@@ -69,6 +64,14 @@ class Twin(Program):
                 scale = 1000 * max(scale, float(self.type.epsilon))
             worst = max(worst, float(np.max(np.abs(ours - value))) / scale)
         return worst
+
+
+def _flat(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from _flat(f"{path}.{key}", each)
+    else:
+        yield path, value
 
 
 def compiled_call(kf: NativeFilter, function: str, keywords: dict[str, Any]) -> int:
