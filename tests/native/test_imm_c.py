@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -209,7 +208,8 @@ measurements: {{s: {{z: {{z: {{h: th, std: 0.5, kind: {kind}}}}}}}}}
 """
     forms = ["ekf", "ukf, covariance: full", "ukf, covariance: sqrt", "iekf"]
     modes = {
-        f"m{k}": f"states: {{th: {{init: {th}, var: 0.05}}, w: {{init: 0.1, var: 0.1}}}}\nfilter: {{type: {forms[k]}}}\n"
+        f"m{k}": f"filter: {{type: {forms[k]}}}\n"
+        f"states: {{th: {{init: {th}, var: 0.05}}, w: {{init: 0.1, var: 0.1}}}}\n"
         f"dynamics: {{f: {{th: th + 0.{k + 1}*w}}, Q: {{th: 0.01, w: 0.01}}}}"
         for k, th in enumerate(starts)
     }
@@ -263,7 +263,8 @@ def test_identical_modes_are_the_single_filter():
 def many(count: int, transition: object, R: str = "0.01", **more: object) -> str:
     """Modes that predict different means of one state; a sensor of `count` components."""
     z = ", ".join(f"z{i}: {{h: x*{1 + i / 10}, var: {R}}}" for i in range(count))
-    top = f"kfgen: 1\nname: many\nscalar: double\nstates: {{x: {{init: 1, var: 1}}}}\nmeasurements: {{s: {{z: {{{z}}}}}}}\n"
+    top = "kfgen: 1\nname: many\nscalar: double\nstates: {x: {init: 1, var: 1}}\n"
+    top += f"measurements: {{s: {{z: {{{z}}}}}}}\n"
     size = len(np.atleast_2d(transition))
     forms = ["ekf", "ekf, covariance: full", "ukf"]
     modes = {
