@@ -53,8 +53,8 @@ DYNAMICS = [
 START = "states: {x: {init: -1, std: 2}, th: {init: -3.1, std: 0}, w: {init: 0, std: 0.2}}"
 SENSORS = (
     "measurements:\n"
-    "  place: {z: {x: {h: x*(1 + n), std: 1}, y: {h: x/2 + w, var: r}}, "
-    "noise: {n: {std: 0.2}}, partial: true, gate: {probability: 0.99}}\n"
+    "  place: {z: {x: {h: x*(1 + s), std: 1}, y: {h: x/2 + w, var: r}}, "
+    "noise: {s: {std: 0.2}}, partial: true, gate: {probability: 0.99}}\n"
     '  course: {z: {c: {h: "atan2(sin(th), cos(th)) + a*w", std: 0.3, kind: angle}}, gate: {probability: 0.9}}'
 )
 OPEN = SENSORS.replace(", gate: {probability: 0.99}", "").replace("var: r", "var: 0.5")  # place refuses nothing
