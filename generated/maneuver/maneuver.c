@@ -284,136 +284,140 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
         + t18 * t27 * t18 + t39 * t40 * t39;
 
     /* speed: where it starts from */
-    const float t51 = maneuver_wrap(th_cruise - th_speed, 3.1415927f);
-    const float t52 = w_speed_speed * w_cruise_speed;
+    const float th_base_speed = w_cruise_speed < w_speed_speed ? th_speed : th_cruise;
+    const float t51 = maneuver_wrap(th_speed - th_base_speed, 3.1415927f);
+    const float t52 = maneuver_wrap(th_cruise - th_base_speed, 3.1415927f) - t51;
+    const float t53 = w_speed_speed * w_cruise_speed;
     const float px_speed_1 = px_speed - w_cruise_speed * t14;
     const float py_speed_1 = py_speed - w_cruise_speed * t15;
     const float v_speed_1 = v_speed - w_cruise_speed * t16;
     const float a_speed_1 = a_speed - w_cruise_speed * t17;
     const float w_speed_1 = w_speed - w_cruise_speed * t18;
-    const float th_speed_1 = maneuver_wrap(th_speed + w_cruise_speed * t51, 3.1415927f);
-    const float t53 = t14 * t52;
+    const float th_speed_1 = maneuver_wrap(th_base_speed + t51 + w_cruise_speed * t52, 3.1415927f);
+    const float t54 = t14 * t53;
     const float p_px_px_speed = w_cruise_speed * kf->modes.cruise.P[0]
-        + w_speed_speed * kf->modes.speed.P[0] + t53 * t14;
+        + w_speed_speed * kf->modes.speed.P[0] + t54 * t14;
     const float p_px_py_speed = w_cruise_speed * kf->modes.cruise.P[1]
-        + w_speed_speed * kf->modes.speed.P[1] + t53 * t15;
-    const float t54 = t15 * t52;
+        + w_speed_speed * kf->modes.speed.P[1] + t54 * t15;
+    const float t55 = t15 * t53;
     const float p_py_py_speed = w_cruise_speed * kf->modes.cruise.P[2]
-        + w_speed_speed * kf->modes.speed.P[2] + t54 * t15;
+        + w_speed_speed * kf->modes.speed.P[2] + t55 * t15;
     const float p_px_v_speed = w_cruise_speed * kf->modes.cruise.P[3]
-        + w_speed_speed * kf->modes.speed.P[3] + t53 * t16;
+        + w_speed_speed * kf->modes.speed.P[3] + t54 * t16;
     const float p_py_v_speed = w_cruise_speed * kf->modes.cruise.P[4]
-        + w_speed_speed * kf->modes.speed.P[4] + t54 * t16;
-    const float t55 = t16 * t52;
+        + w_speed_speed * kf->modes.speed.P[4] + t55 * t16;
+    const float t56 = t16 * t53;
     const float p_v_v_speed = w_cruise_speed * kf->modes.cruise.P[5]
-        + w_speed_speed * kf->modes.speed.P[5] + t55 * t16;
+        + w_speed_speed * kf->modes.speed.P[5] + t56 * t16;
     const float p_px_th_speed = w_cruise_speed * kf->modes.cruise.P[6]
-        + w_speed_speed * kf->modes.speed.P[6] - t53 * t51;
+        + w_speed_speed * kf->modes.speed.P[6] - t54 * t52;
     const float p_py_th_speed = w_cruise_speed * kf->modes.cruise.P[7]
-        + w_speed_speed * kf->modes.speed.P[7] - t54 * t51;
+        + w_speed_speed * kf->modes.speed.P[7] - t55 * t52;
     const float p_v_th_speed = w_cruise_speed * kf->modes.cruise.P[8]
-        + w_speed_speed * kf->modes.speed.P[8] - t55 * t51;
-    const float t56 = t51 * t52;
+        + w_speed_speed * kf->modes.speed.P[8] - t56 * t52;
+    const float t57 = t52 * t53;
     const float p_th_th_speed = w_cruise_speed * kf->modes.cruise.P[9]
-        + w_speed_speed * kf->modes.speed.P[9] + t56 * t51;
+        + w_speed_speed * kf->modes.speed.P[9] + t57 * t52;
     const float p_px_a_speed = w_cruise_speed * kf->modes.cruise.P[10]
-        + w_speed_speed * kf->modes.speed.P[10] + t53 * t17;
+        + w_speed_speed * kf->modes.speed.P[10] + t54 * t17;
     const float p_py_a_speed = w_cruise_speed * kf->modes.cruise.P[11]
-        + w_speed_speed * kf->modes.speed.P[11] + t54 * t17;
+        + w_speed_speed * kf->modes.speed.P[11] + t55 * t17;
     const float p_v_a_speed = w_cruise_speed * kf->modes.cruise.P[12]
-        + w_speed_speed * kf->modes.speed.P[12] + t55 * t17;
+        + w_speed_speed * kf->modes.speed.P[12] + t56 * t17;
     const float p_th_a_speed = w_cruise_speed * kf->modes.cruise.P[13]
-        + w_speed_speed * kf->modes.speed.P[13] - t56 * t17;
-    const float t57 = t17 * t52;
+        + w_speed_speed * kf->modes.speed.P[13] - t57 * t17;
+    const float t58 = t17 * t53;
     const float p_a_a_speed = w_cruise_speed * kf->modes.cruise.P[14]
-        + w_speed_speed * kf->modes.speed.P[14] + t57 * t17;
+        + w_speed_speed * kf->modes.speed.P[14] + t58 * t17;
     const float p_px_w_speed = w_cruise_speed * kf->modes.cruise.P[15]
-        + w_speed_speed * kf->modes.speed.P[15] + t53 * t18;
+        + w_speed_speed * kf->modes.speed.P[15] + t54 * t18;
     const float p_py_w_speed = w_cruise_speed * kf->modes.cruise.P[16]
-        + w_speed_speed * kf->modes.speed.P[16] + t54 * t18;
+        + w_speed_speed * kf->modes.speed.P[16] + t55 * t18;
     const float p_v_w_speed = w_cruise_speed * kf->modes.cruise.P[17]
-        + w_speed_speed * kf->modes.speed.P[17] + t55 * t18;
+        + w_speed_speed * kf->modes.speed.P[17] + t56 * t18;
     const float p_th_w_speed = w_cruise_speed * kf->modes.cruise.P[18]
-        + w_speed_speed * kf->modes.speed.P[18] - t56 * t18;
+        + w_speed_speed * kf->modes.speed.P[18] - t57 * t18;
     const float p_a_w_speed = w_cruise_speed * kf->modes.cruise.P[19]
-        + w_speed_speed * kf->modes.speed.P[19] + t57 * t18;
+        + w_speed_speed * kf->modes.speed.P[19] + t58 * t18;
     const float p_w_w_speed = w_cruise_speed * kf->modes.cruise.P[20]
-        + w_speed_speed * kf->modes.speed.P[20] + t18 * t52 * t18;
+        + w_speed_speed * kf->modes.speed.P[20] + t18 * t53 * t18;
 
     /* turn: where it starts from */
-    const float t58 = maneuver_wrap(th_cruise - th_turn, 3.1415927f);
-    const float t59 = w_turn_turn * w_cruise_turn;
+    const float th_base_turn = w_cruise_turn < w_turn_turn ? th_turn : th_cruise;
+    const float t59 = maneuver_wrap(th_turn - th_base_turn, 3.1415927f);
+    const float t60 = maneuver_wrap(th_cruise - th_base_turn, 3.1415927f) - t59;
+    const float t61 = w_turn_turn * w_cruise_turn;
     const float px_turn_1 = px_turn - w_cruise_turn * t19;
     const float py_turn_1 = py_turn - w_cruise_turn * t20;
     const float v_turn_1 = v_turn - w_cruise_turn * t21;
     const float a_turn_1 = a_turn - w_cruise_turn * t22;
     const float w_turn_1 = w_turn - w_cruise_turn * t23;
-    const float th_turn_1 = maneuver_wrap(th_turn + w_cruise_turn * t58, 3.1415927f);
-    const float t60 = t19 * t59;
+    const float th_turn_1 = maneuver_wrap(th_base_turn + t59 + w_cruise_turn * t60, 3.1415927f);
+    const float t62 = t19 * t61;
     const float p_px_px_turn = w_cruise_turn * kf->modes.cruise.P[0]
-        + w_turn_turn * kf->modes.turn.P[0] + t60 * t19;
+        + w_turn_turn * kf->modes.turn.P[0] + t62 * t19;
     const float p_px_py_turn = w_cruise_turn * kf->modes.cruise.P[1]
-        + w_turn_turn * kf->modes.turn.P[1] + t60 * t20;
-    const float t61 = t20 * t59;
+        + w_turn_turn * kf->modes.turn.P[1] + t62 * t20;
+    const float t63 = t20 * t61;
     const float p_py_py_turn = w_cruise_turn * kf->modes.cruise.P[2]
-        + w_turn_turn * kf->modes.turn.P[2] + t61 * t20;
+        + w_turn_turn * kf->modes.turn.P[2] + t63 * t20;
     const float p_px_v_turn = w_cruise_turn * kf->modes.cruise.P[3]
-        + w_turn_turn * kf->modes.turn.P[3] + t60 * t21;
+        + w_turn_turn * kf->modes.turn.P[3] + t62 * t21;
     const float p_py_v_turn = w_cruise_turn * kf->modes.cruise.P[4]
-        + w_turn_turn * kf->modes.turn.P[4] + t61 * t21;
-    const float t62 = t21 * t59;
+        + w_turn_turn * kf->modes.turn.P[4] + t63 * t21;
+    const float t64 = t21 * t61;
     const float p_v_v_turn = w_cruise_turn * kf->modes.cruise.P[5]
-        + w_turn_turn * kf->modes.turn.P[5] + t62 * t21;
+        + w_turn_turn * kf->modes.turn.P[5] + t64 * t21;
     const float p_px_th_turn = w_cruise_turn * kf->modes.cruise.P[6]
-        + w_turn_turn * kf->modes.turn.P[6] - t60 * t58;
+        + w_turn_turn * kf->modes.turn.P[6] - t62 * t60;
     const float p_py_th_turn = w_cruise_turn * kf->modes.cruise.P[7]
-        + w_turn_turn * kf->modes.turn.P[7] - t61 * t58;
+        + w_turn_turn * kf->modes.turn.P[7] - t63 * t60;
     const float p_v_th_turn = w_cruise_turn * kf->modes.cruise.P[8]
-        + w_turn_turn * kf->modes.turn.P[8] - t62 * t58;
-    const float t63 = t58 * t59;
+        + w_turn_turn * kf->modes.turn.P[8] - t64 * t60;
+    const float t65 = t60 * t61;
     const float p_th_th_turn = w_cruise_turn * kf->modes.cruise.P[9]
-        + w_turn_turn * kf->modes.turn.P[9] + t63 * t58;
+        + w_turn_turn * kf->modes.turn.P[9] + t65 * t60;
     const float p_px_a_turn = w_cruise_turn * kf->modes.cruise.P[10]
-        + w_turn_turn * kf->modes.turn.P[10] + t60 * t22;
+        + w_turn_turn * kf->modes.turn.P[10] + t62 * t22;
     const float p_py_a_turn = w_cruise_turn * kf->modes.cruise.P[11]
-        + w_turn_turn * kf->modes.turn.P[11] + t61 * t22;
+        + w_turn_turn * kf->modes.turn.P[11] + t63 * t22;
     const float p_v_a_turn = w_cruise_turn * kf->modes.cruise.P[12]
-        + w_turn_turn * kf->modes.turn.P[12] + t62 * t22;
+        + w_turn_turn * kf->modes.turn.P[12] + t64 * t22;
     const float p_th_a_turn = w_cruise_turn * kf->modes.cruise.P[13]
-        + w_turn_turn * kf->modes.turn.P[13] - t63 * t22;
-    const float t64 = t22 * t59;
+        + w_turn_turn * kf->modes.turn.P[13] - t65 * t22;
+    const float t66 = t22 * t61;
     const float p_a_a_turn = w_cruise_turn * kf->modes.cruise.P[14]
-        + w_turn_turn * kf->modes.turn.P[14] + t64 * t22;
+        + w_turn_turn * kf->modes.turn.P[14] + t66 * t22;
     const float p_px_w_turn = w_cruise_turn * kf->modes.cruise.P[15]
-        + w_turn_turn * kf->modes.turn.P[15] + t60 * t23;
+        + w_turn_turn * kf->modes.turn.P[15] + t62 * t23;
     const float p_py_w_turn = w_cruise_turn * kf->modes.cruise.P[16]
-        + w_turn_turn * kf->modes.turn.P[16] + t61 * t23;
+        + w_turn_turn * kf->modes.turn.P[16] + t63 * t23;
     const float p_v_w_turn = w_cruise_turn * kf->modes.cruise.P[17]
-        + w_turn_turn * kf->modes.turn.P[17] + t62 * t23;
+        + w_turn_turn * kf->modes.turn.P[17] + t64 * t23;
     const float p_th_w_turn = w_cruise_turn * kf->modes.cruise.P[18]
-        + w_turn_turn * kf->modes.turn.P[18] - t63 * t23;
+        + w_turn_turn * kf->modes.turn.P[18] - t65 * t23;
     const float p_a_w_turn = w_cruise_turn * kf->modes.cruise.P[19]
-        + w_turn_turn * kf->modes.turn.P[19] + t64 * t23;
+        + w_turn_turn * kf->modes.turn.P[19] + t66 * t23;
     const float p_w_w_turn = w_cruise_turn * kf->modes.cruise.P[20]
-        + w_turn_turn * kf->modes.turn.P[20] + t23 * t59 * t23;
+        + w_turn_turn * kf->modes.turn.P[20] + t23 * t61 * t23;
 
     /* cruise: model */
     const float cos_th_cruise = cosf(th_cruise_1);
     const float f_py_th_cruise = v_cruise_1 * cos_th_cruise;
     const float px_next_cruise = px_cruise_1 + f_py_th_cruise;
     const float sin_th_cruise = sinf(th_cruise_1);
-    const float t65 = v_cruise_1 * sin_th_cruise;
-    const float py_next_cruise = py_cruise_1 + t65;
+    const float t67 = v_cruise_1 * sin_th_cruise;
+    const float py_next_cruise = py_cruise_1 + t67;
     const float a_next_cruise = 0.5f * a_cruise_1;
     const float w_next_cruise = 0.5f * w_cruise_1;
 
     /* cruise: P = F P F^T + Q: the diagonal first, for the guards */
     const float p_px_v_cruise_1 = p_px_v_cruise + p_v_v_cruise * cos_th_cruise
-        - p_v_th_cruise * t65;
+        - p_v_th_cruise * t67;
     const float p_px_th_cruise_1 = p_px_th_cruise + p_v_th_cruise * cos_th_cruise
-        - p_th_th_cruise * t65;
+        - p_th_th_cruise * t67;
     const float p_px_px_cruise_1 = p_px_px_cruise + p_px_v_cruise * cos_th_cruise
-        - p_px_th_cruise * t65 + p_px_v_cruise_1 * cos_th_cruise - p_px_th_cruise_1 * t65 + 1.0f;
+        - p_px_th_cruise * t67 + p_px_v_cruise_1 * cos_th_cruise - p_px_th_cruise_1 * t67 + 1.0f;
     const float p_py_v_cruise_1 = p_py_v_cruise + p_v_v_cruise * sin_th_cruise
         + p_v_th_cruise * f_py_th_cruise;
     const float p_py_th_cruise_1 = p_py_th_cruise + p_v_th_cruise * sin_th_cruise
@@ -434,36 +438,36 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     }
 
     /* speed: model */
-    const float t66 = v_speed_1 + 0.5f * a_speed_1;
+    const float t68 = v_speed_1 + 0.5f * a_speed_1;
     const float cos_th_speed = cosf(th_speed_1);
-    const float f_py_th_speed = t66 * cos_th_speed;
+    const float f_py_th_speed = t68 * cos_th_speed;
     const float px_next_speed = px_speed_1 + f_py_th_speed;
     const float f_px_a_speed = 0.5f * cos_th_speed;
     const float sin_th_speed = sinf(th_speed_1);
-    const float t67 = t66 * sin_th_speed;
-    const float py_next_speed = py_speed_1 + t67;
+    const float t69 = t68 * sin_th_speed;
+    const float py_next_speed = py_speed_1 + t69;
     const float f_py_a_speed = 0.5f * sin_th_speed;
     const float v_next_speed = a_speed_1 + v_speed_1;
     const float w_next_speed = 0.5f * w_speed_1;
 
     /* speed: P = F P F^T + Q: the diagonal first, for the guards */
-    const float t68 = p_px_v_speed + p_v_v_speed * cos_th_speed - p_v_th_speed * t67
+    const float t70 = p_px_v_speed + p_v_v_speed * cos_th_speed - p_v_th_speed * t69
         + p_v_a_speed * f_px_a_speed;
-    const float p_px_th_speed_1 = p_px_th_speed + p_v_th_speed * cos_th_speed - p_th_th_speed * t67
+    const float p_px_th_speed_1 = p_px_th_speed + p_v_th_speed * cos_th_speed - p_th_th_speed * t69
         + p_th_a_speed * f_px_a_speed;
-    const float p_px_a_speed_1 = p_px_a_speed + p_v_a_speed * cos_th_speed - p_th_a_speed * t67
+    const float p_px_a_speed_1 = p_px_a_speed + p_v_a_speed * cos_th_speed - p_th_a_speed * t69
         + p_a_a_speed * f_px_a_speed;
-    const float p_px_px_speed_1 = p_px_px_speed + p_px_v_speed * cos_th_speed - p_px_th_speed * t67
-        + p_px_a_speed * f_px_a_speed + t68 * cos_th_speed - p_px_th_speed_1 * t67
+    const float p_px_px_speed_1 = p_px_px_speed + p_px_v_speed * cos_th_speed - p_px_th_speed * t69
+        + p_px_a_speed * f_px_a_speed + t70 * cos_th_speed - p_px_th_speed_1 * t69
         + p_px_a_speed_1 * f_px_a_speed + 1.0f;
-    const float t69 = p_py_v_speed + p_v_v_speed * sin_th_speed + p_v_th_speed * f_py_th_speed
+    const float t71 = p_py_v_speed + p_v_v_speed * sin_th_speed + p_v_th_speed * f_py_th_speed
         + p_v_a_speed * f_py_a_speed;
     const float p_py_th_speed_1 = p_py_th_speed + p_v_th_speed * sin_th_speed
         + p_th_th_speed * f_py_th_speed + p_th_a_speed * f_py_a_speed;
     const float p_py_a_speed_1 = p_py_a_speed + p_v_a_speed * sin_th_speed
         + p_th_a_speed * f_py_th_speed + p_a_a_speed * f_py_a_speed;
     const float p_py_py_speed_1 = p_py_py_speed + p_py_v_speed * sin_th_speed
-        + p_py_th_speed * f_py_th_speed + p_py_a_speed * f_py_a_speed + t69 * sin_th_speed
+        + p_py_th_speed * f_py_th_speed + p_py_a_speed * f_py_a_speed + t71 * sin_th_speed
         + p_py_th_speed_1 * f_py_th_speed + p_py_a_speed_1 * f_py_a_speed + 1.0f;
     const float p_v_a_speed_1 = p_v_a_speed + p_a_a_speed;
     const float p_v_v_speed_1 = p_v_v_speed + p_v_a_speed + p_v_a_speed_1 + 0.1f;
@@ -479,75 +483,75 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     }
 
     /* turn: model */
-    const float t70 = th_turn_1 + 0.5f * w_turn_1;
-    const float f_px_v_turn = cosf(t70);
+    const float t72 = th_turn_1 + 0.5f * w_turn_1;
+    const float f_px_v_turn = cosf(t72);
     const float f_py_th_turn = v_turn_1 * f_px_v_turn;
     const float px_next_turn = px_turn_1 + f_py_th_turn;
-    const float f_py_v_turn = sinf(t70);
-    const float t71 = v_turn_1 * f_py_v_turn;
-    const float t72 = 0.5f * t71;
-    const float py_next_turn = py_turn_1 + t71;
+    const float f_py_v_turn = sinf(t72);
+    const float t73 = v_turn_1 * f_py_v_turn;
+    const float t74 = 0.5f * t73;
+    const float py_next_turn = py_turn_1 + t73;
     const float f_py_w_turn = 0.5f * f_py_th_turn;
     const float th_next_turn = th_turn_1 + w_turn_1;
     const float a_next_turn = 0.5f * a_turn_1;
 
     /* turn: P = F P F^T + Q: the diagonal first, for the guards */
-    const float p_px_v_turn_1 = p_px_v_turn + p_v_v_turn * f_px_v_turn - p_v_th_turn * t71
-        - p_v_w_turn * t72;
-    const float t73 = p_px_th_turn + p_v_th_turn * f_px_v_turn - p_th_th_turn * t71
-        - p_th_w_turn * t72;
-    const float p_px_w_turn_1 = p_px_w_turn + p_v_w_turn * f_px_v_turn - p_th_w_turn * t71
-        - p_w_w_turn * t72;
-    const float p_px_px_turn_1 = p_px_px_turn + p_px_v_turn * f_px_v_turn - p_px_th_turn * t71
-        - p_px_w_turn * t72 + p_px_v_turn_1 * f_px_v_turn - t73 * t71 - p_px_w_turn_1 * t72 + 1.0f;
+    const float p_px_v_turn_1 = p_px_v_turn + p_v_v_turn * f_px_v_turn - p_v_th_turn * t73
+        - p_v_w_turn * t74;
+    const float t75 = p_px_th_turn + p_v_th_turn * f_px_v_turn - p_th_th_turn * t73
+        - p_th_w_turn * t74;
+    const float p_px_w_turn_1 = p_px_w_turn + p_v_w_turn * f_px_v_turn - p_th_w_turn * t73
+        - p_w_w_turn * t74;
+    const float p_px_px_turn_1 = p_px_px_turn + p_px_v_turn * f_px_v_turn - p_px_th_turn * t73
+        - p_px_w_turn * t74 + p_px_v_turn_1 * f_px_v_turn - t75 * t73 - p_px_w_turn_1 * t74 + 1.0f;
     const float p_py_v_turn_1 = p_py_v_turn + p_v_v_turn * f_py_v_turn + p_v_th_turn * f_py_th_turn
         + p_v_w_turn * f_py_w_turn;
-    const float t74 = p_py_th_turn + p_v_th_turn * f_py_v_turn + p_th_th_turn * f_py_th_turn
+    const float t76 = p_py_th_turn + p_v_th_turn * f_py_v_turn + p_th_th_turn * f_py_th_turn
         + p_th_w_turn * f_py_w_turn;
     const float p_py_w_turn_1 = p_py_w_turn + p_v_w_turn * f_py_v_turn + p_th_w_turn * f_py_th_turn
         + p_w_w_turn * f_py_w_turn;
     const float p_py_py_turn_1 = p_py_py_turn + p_py_v_turn * f_py_v_turn
         + p_py_th_turn * f_py_th_turn + p_py_w_turn * f_py_w_turn + p_py_v_turn_1 * f_py_v_turn
-        + t74 * f_py_th_turn + p_py_w_turn_1 * f_py_w_turn + 1.0f;
+        + t76 * f_py_th_turn + p_py_w_turn_1 * f_py_w_turn + 1.0f;
     const float p_v_v_turn_1 = p_v_v_turn + 0.1f;
     const float p_th_w_turn_1 = p_th_w_turn + p_w_w_turn;
     const float p_th_th_turn_1 = p_th_th_turn + p_th_w_turn + p_th_w_turn_1 + 0.00001f;
     const float p_a_a_turn_1 = 0.25f * p_a_a_turn + 0.1f;
     const float p_w_w_turn_1 = p_w_w_turn + 0.001f;
-    const float t75 = maneuver_wrap(th_next_turn, 3.1415927f);
+    const float t77 = maneuver_wrap(th_next_turn, 3.1415927f);
 
     /* turn: guards */
-    if (!maneuver_finite(px_next_turn + py_next_turn + t75 + a_next_turn + p_px_px_turn_1
+    if (!maneuver_finite(px_next_turn + py_next_turn + t77 + a_next_turn + p_px_px_turn_1
         + p_py_py_turn_1 + p_v_v_turn_1 + p_th_th_turn_1 + p_a_a_turn_1 + p_w_w_turn_1)) {
         return MANEUVER_NOT_FINITE;
     }
-    const float t76 = 1.0f / (c_cruise + c_speed + c_turn);
-    const float mu_cruise_next = c_cruise * t76;
-    const float mu_speed_next = c_speed * t76;
-    const float mu_turn_next = c_turn * t76;
+    const float t78 = 1.0f / (c_cruise + c_speed + c_turn);
+    const float mu_cruise_next = c_cruise * t78;
+    const float mu_speed_next = c_speed * t78;
+    const float mu_turn_next = c_turn * t78;
 
     /* combined state */
-    const bool t77 = mu_cruise_next < mu_speed_next;
-    const float th_base = (t77 ? mu_speed_next : mu_cruise_next) < mu_turn_next ? t75
-        : (t77 ? th_speed_1 : th_cruise_1);
-    const float t78 = maneuver_wrap(th_cruise_1 - th_base, 3.1415927f);
-    const float t79 = mu_cruise_next + mu_speed_next;
-    const float t80 = mu_speed_next * (t79 > 1.1754944e-38f ? 1.0f / t79 : 0.0f);
-    const float t81 = t80 * (px_next_speed - px_next_cruise);
-    const float t82 = t80 * (py_next_speed - py_next_cruise);
-    const float t83 = t80 * (v_next_speed - v_cruise_1);
-    const float t84 = t78 + t80 * (maneuver_wrap(th_speed_1 - th_base, 3.1415927f) - t78);
-    const float t85 = t80 * (a_speed_1 - a_next_cruise);
-    const float t86 = t80 * (w_next_speed - w_next_cruise);
-    const float px_all = px_next_cruise + t81
-        + mu_turn_next * (px_next_turn - px_next_cruise - t81);
-    const float py_all = py_next_cruise + t82
-        + mu_turn_next * (py_next_turn - py_next_cruise - t82);
-    const float v_all = v_cruise_1 + t83 + mu_turn_next * (v_turn_1 - v_cruise_1 - t83);
-    const float th_all = th_base + t84
-        + mu_turn_next * (maneuver_wrap(t75 - th_base, 3.1415927f) - t84);
-    const float a_all = a_next_cruise + t85 + mu_turn_next * (a_next_turn - a_next_cruise - t85);
-    const float w_all = w_next_cruise + t86 + mu_turn_next * (w_turn_1 - w_next_cruise - t86);
+    const bool t79 = mu_cruise_next < mu_speed_next;
+    const float th_base = (t79 ? mu_speed_next : mu_cruise_next) < mu_turn_next ? t77
+        : (t79 ? th_speed_1 : th_cruise_1);
+    const float t80 = maneuver_wrap(th_cruise_1 - th_base, 3.1415927f);
+    const float t81 = mu_cruise_next + mu_speed_next;
+    const float t82 = mu_speed_next * (t81 > 1.1754944e-38f ? 1.0f / t81 : 0.0f);
+    const float t83 = t82 * (px_next_speed - px_next_cruise);
+    const float t84 = t82 * (py_next_speed - py_next_cruise);
+    const float t85 = t82 * (v_next_speed - v_cruise_1);
+    const float t86 = t80 + t82 * (maneuver_wrap(th_speed_1 - th_base, 3.1415927f) - t80);
+    const float t87 = t82 * (a_speed_1 - a_next_cruise);
+    const float t88 = t82 * (w_next_speed - w_next_cruise);
+    const float px_all = px_next_cruise + t83
+        + mu_turn_next * (px_next_turn - px_next_cruise - t83);
+    const float py_all = py_next_cruise + t84
+        + mu_turn_next * (py_next_turn - py_next_cruise - t84);
+    const float v_all = v_cruise_1 + t85 + mu_turn_next * (v_turn_1 - v_cruise_1 - t85);
+    const float th_all = th_base + t86
+        + mu_turn_next * (maneuver_wrap(t77 - th_base, 3.1415927f) - t86);
+    const float a_all = a_next_cruise + t87 + mu_turn_next * (a_next_turn - a_next_cruise - t87);
+    const float w_all = w_next_cruise + t88 + mu_turn_next * (w_turn_1 - w_next_cruise - t88);
     if (!maneuver_finite(px_all + py_all + v_all + th_all + a_all + w_all + mu_cruise_next
         + mu_speed_next + mu_turn_next)) {
         return MANEUVER_NOT_FINITE;
@@ -563,7 +567,7 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.cruise.P[0] = p_px_px_cruise_1;
     const float p_px_py_cruise_1 = p_px_py_cruise + p_px_v_cruise * sin_th_cruise
         + p_px_th_cruise * f_py_th_cruise + p_py_v_cruise_1 * cos_th_cruise
-        - p_py_th_cruise_1 * t65;
+        - p_py_th_cruise_1 * t67;
     kf->modes.cruise.P[1] = p_px_py_cruise_1;
     kf->modes.cruise.P[2] = p_py_py_cruise_1;
     kf->modes.cruise.P[3] = p_px_v_cruise_1;
@@ -574,7 +578,7 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.cruise.P[8] = p_v_th_cruise;
     kf->modes.cruise.P[9] = p_th_th_cruise_1;
     const float p_px_a_cruise_1 = 0.5f
-        * (p_px_a_cruise + p_v_a_cruise * cos_th_cruise - p_th_a_cruise * t65);
+        * (p_px_a_cruise + p_v_a_cruise * cos_th_cruise - p_th_a_cruise * t67);
     kf->modes.cruise.P[10] = p_px_a_cruise_1;
     const float p_py_a_cruise_1 = 0.5f
         * (p_py_a_cruise + p_v_a_cruise * sin_th_cruise + p_th_a_cruise * f_py_th_cruise);
@@ -585,7 +589,7 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.cruise.P[13] = p_th_a_cruise_1;
     kf->modes.cruise.P[14] = p_a_a_cruise_1;
     const float p_px_w_cruise_1 = 0.5f
-        * (p_px_w_cruise + p_v_w_cruise * cos_th_cruise - p_th_w_cruise * t65);
+        * (p_px_w_cruise + p_v_w_cruise * cos_th_cruise - p_th_w_cruise * t67);
     kf->modes.cruise.P[15] = p_px_w_cruise_1;
     const float p_py_w_cruise_1 = 0.5f
         * (p_py_w_cruise + p_v_w_cruise * sin_th_cruise + p_th_w_cruise * f_py_th_cruise);
@@ -607,13 +611,13 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.speed.x[MANEUVER_W] = w_next_speed;
     kf->modes.speed.P[0] = p_px_px_speed_1;
     const float p_px_py_speed_1 = p_px_py_speed + p_px_v_speed * sin_th_speed
-        + p_px_th_speed * f_py_th_speed + p_px_a_speed * f_py_a_speed + t69 * cos_th_speed
-        - p_py_th_speed_1 * t67 + p_py_a_speed_1 * f_px_a_speed;
+        + p_px_th_speed * f_py_th_speed + p_px_a_speed * f_py_a_speed + t71 * cos_th_speed
+        - p_py_th_speed_1 * t69 + p_py_a_speed_1 * f_px_a_speed;
     kf->modes.speed.P[1] = p_px_py_speed_1;
     kf->modes.speed.P[2] = p_py_py_speed_1;
-    const float p_px_v_speed_1 = t68 + p_px_a_speed_1;
+    const float p_px_v_speed_1 = t70 + p_px_a_speed_1;
     kf->modes.speed.P[3] = p_px_v_speed_1;
-    const float p_py_v_speed_1 = t69 + p_py_a_speed_1;
+    const float p_py_v_speed_1 = t71 + p_py_a_speed_1;
     kf->modes.speed.P[4] = p_py_v_speed_1;
     kf->modes.speed.P[5] = p_v_v_speed_1;
     kf->modes.speed.P[6] = p_px_th_speed_1;
@@ -627,7 +631,7 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.speed.P[13] = p_th_a_speed;
     kf->modes.speed.P[14] = p_a_a_speed_1;
     const float p_px_w_speed_1 = 0.5f
-        * (p_px_w_speed + p_v_w_speed * cos_th_speed - p_th_w_speed * t67
+        * (p_px_w_speed + p_v_w_speed * cos_th_speed - p_th_w_speed * t69
         + p_a_w_speed * f_px_a_speed);
     kf->modes.speed.P[15] = p_px_w_speed_1;
     const float p_py_w_speed_1 = 0.5f
@@ -646,27 +650,27 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.turn.x[MANEUVER_PX] = px_next_turn;
     kf->modes.turn.x[MANEUVER_PY] = py_next_turn;
     kf->modes.turn.x[MANEUVER_V] = v_turn_1;
-    kf->modes.turn.x[MANEUVER_TH] = t75;
+    kf->modes.turn.x[MANEUVER_TH] = t77;
     kf->modes.turn.x[MANEUVER_A] = a_next_turn;
     kf->modes.turn.x[MANEUVER_W] = w_turn_1;
     kf->modes.turn.P[0] = p_px_px_turn_1;
     const float p_px_py_turn_1 = p_px_py_turn + p_px_v_turn * f_py_v_turn
         + p_px_th_turn * f_py_th_turn + p_px_w_turn * f_py_w_turn + p_py_v_turn_1 * f_px_v_turn
-        - t74 * t71 - p_py_w_turn_1 * t72;
+        - t76 * t73 - p_py_w_turn_1 * t74;
     kf->modes.turn.P[1] = p_px_py_turn_1;
     kf->modes.turn.P[2] = p_py_py_turn_1;
     kf->modes.turn.P[3] = p_px_v_turn_1;
     kf->modes.turn.P[4] = p_py_v_turn_1;
     kf->modes.turn.P[5] = p_v_v_turn_1;
-    const float p_px_th_turn_1 = t73 + p_px_w_turn_1;
+    const float p_px_th_turn_1 = t75 + p_px_w_turn_1;
     kf->modes.turn.P[6] = p_px_th_turn_1;
-    const float p_py_th_turn_1 = t74 + p_py_w_turn_1;
+    const float p_py_th_turn_1 = t76 + p_py_w_turn_1;
     kf->modes.turn.P[7] = p_py_th_turn_1;
     const float p_v_th_turn_1 = p_v_th_turn + p_v_w_turn;
     kf->modes.turn.P[8] = p_v_th_turn_1;
     kf->modes.turn.P[9] = p_th_th_turn_1;
-    const float p_px_a_turn_1 = 0.5f * (p_px_a_turn + p_v_a_turn * f_px_v_turn - p_th_a_turn * t71
-        - p_a_w_turn * t72);
+    const float p_px_a_turn_1 = 0.5f * (p_px_a_turn + p_v_a_turn * f_px_v_turn - p_th_a_turn * t73
+        - p_a_w_turn * t74);
     kf->modes.turn.P[10] = p_px_a_turn_1;
     const float p_py_a_turn_1 = 0.5f * (p_py_a_turn + p_v_a_turn * f_py_v_turn
         + p_th_a_turn * f_py_th_turn + p_a_w_turn * f_py_w_turn);

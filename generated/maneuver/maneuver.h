@@ -18,7 +18,7 @@
  * step: 1 s, compiled in
  *
  * RAM 368 bytes a filter. Operations:
- *   predict       464 mul, 445 add, 6 div, 9 compare, 3 cos, 18 select, 3 sin, 13 wrap
+ *   predict       464 mul, 451 add, 6 div, 11 compare, 3 cos, 20 select, 3 sin, 15 wrap
  *   update_radar  340 mul, 319 add, 17 div, 3 sqrt, 3 atan2, 23 compare, 3 exp, 6 log, 3 max, 2
  *       min, 14 select, 10 wrap
  * Recommended with gcc, for these long functions without branches:
@@ -127,7 +127,7 @@ maneuver_status_t maneuver_init(maneuver_t *kf);
  * @param kf  filter
  * @return MANEUVER_OK, or an error that leaves *kf as it was
  *
- * 464 mul, 445 add, 6 div, 9 compare, 3 cos, 18 select, 3 sin, 13 wrap.
+ * 464 mul, 451 add, 6 div, 11 compare, 3 cos, 20 select, 3 sin, 15 wrap.
  */
 maneuver_status_t maneuver_predict(maneuver_t *kf);
 
