@@ -34,8 +34,11 @@ class Generated:
     view: View
 
 
-def build(spec: Spec, scalar: str | None = None) -> Generated:
-    """Generate a spec's files. scalar overrides the spec's. Raises SpecError."""
+def build(spec: Spec, scalar: str | None = None, *, judge: bool = True) -> Generated:
+    """Generate a spec's files. scalar overrides the spec's. Raises SpecError.
+
+    judge: whether a budget that the prediction exceeds is an error.
+    """
     overridden = scalar is not None and scalar != spec.scalar
     if scalar is not None:
         spec = replace(spec, scalar=scalar)

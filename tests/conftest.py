@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 
 import pytest
 
@@ -12,3 +13,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update", action="store_true", help="rewrite generated/ and the README's C from specs instead of comparing"
     )
+
+
+@pytest.fixture
+def needs():
+    """Skips where a program is missing; on the build server that is a failure."""
+
+    def need(*programs: str) -> None:
+        missing = [each for each in programs if shutil.which(each) is None]
+        if missing:
+            message = f"not found: {', '.join(missing)}"
+            pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
+
+    return need

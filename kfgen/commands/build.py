@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kfgen.commands.options import example, load_spec, scalar_option
+from kfgen.commands.options import aligned, example, load_spec, scalar_option
 from kfgen.errors import KfgenError, Mistake, SpecError
 
 if TYPE_CHECKING:
@@ -182,16 +182,3 @@ def _sizes(spec: Spec) -> list[str]:
 
 def _operations(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{number} {operation}" for operation, number in counts.items() if number) or "none"
-
-
-def aligned(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> list[str]:
-    """Text rows as lines with aligned columns, the first row underlined; columns in `right` to the right."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    rule = ["-" * width for width in widths]
-    return [
-        "  ".join(
-            cell.rjust(width) if i in right else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in [rows[0], rule, *rows[1:]]
-    ]

@@ -11,10 +11,11 @@ from __future__ import annotations
 import sys
 from concurrent.futures import ProcessPoolExecutor
 
-from kfgen.commands.build import aligned
+from kfgen.commands.options import aligned
+from kfgen.cost import Cost
 from tests.benchmarks.budgets import CEILINGS, GENERATION, INERTIAL, PROBLEMS, cost, inertial_cost
 from tests.benchmarks.generation import cold_build
-from tests.benchmarks.measure import Cost, missing
+from tests.benchmarks.tools import missing
 
 HEAD = ("problem", "n, m", "form", "instructions", "flash", "RAM", "stack", "YAFL insn / flash", "TinyEKF insn")
 

@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from kfgen.cost import Cost, measure, recommended_flags
 from kfgen.generate import build
 from kfgen.override import override
 from kfgen.simulate import simulate
 from kfgen.spec import load, loads
-from tests.benchmarks.measure import Cost, measure, recommended_flags
 from tests.oracle import problems
 
 ROWS = 60
@@ -95,7 +95,7 @@ def inertial_cost() -> Cost:
     """Measure the 24-state inertial filter."""
     spec = load(INERTIAL)
     files = build(spec).files
-    return measure(spec, files, simulate(spec, 10), recommended_flags(files[f"{spec.name}.h"]))
+    return measure(spec, files, simulate(spec, 10), flags=recommended_flags(files[f"{spec.name}.h"]))
 
 
 def cost(name: str, form: str) -> Cost:
@@ -105,4 +105,4 @@ def cost(name: str, form: str) -> Cost:
     spec = override(loads(problem.spec), "float", filter={"covariance": covariance, "update": update})
     files = build(spec).files
     flags = recommended_flags(files[f"{spec.name}.h"]) if problem.n >= FLAGS_FROM else []
-    return measure(spec, files, simulate(spec, ROWS), flags)
+    return measure(spec, files, simulate(spec, ROWS), flags=flags)

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from tests.benchmarks.measure import missing
+from tests.benchmarks.tools import missing
 
 
 @pytest.fixture(scope="session")

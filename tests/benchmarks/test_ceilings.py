@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from kfgen.cost import recommended_flags
 from tests.benchmarks.budgets import (
     CEILINGS,
     GENERATION,
@@ -17,7 +18,6 @@ from tests.benchmarks.budgets import (
     inertial_cost,
 )
 from tests.benchmarks.generation import cold_build
-from tests.benchmarks.measure import recommended_flags
 
 README = (Path(__file__).parents[2] / "README.md").read_text()
 TOLERANCE = 0.02  # of the README's figures: they are those of one version of the compiler

@@ -6,11 +6,11 @@ from functools import cache
 
 import pytest
 
+from kfgen.cost import Cost, measure
 from kfgen.generate import build
 from kfgen.override import override
 from kfgen.simulate import simulate
 from kfgen.spec import loads
-from tests.benchmarks.measure import Cost, measure
 from tests.oracle import problems
 
 MOST = 1.25  # times what the filter without the option takes

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from kfgen.commands.build import aligned
+from kfgen.commands.options import aligned
 
 SPEC = "vehicle_small.yaml"
 
@@ -91,7 +91,7 @@ def test_two_of_one_name(kfgen, folder):
         (["build", SPEC, "-o", "file/below"], "file"),
         (["build", SPEC, "--nothing"], "No such option"),
         (["nothing"], "No such command"),
-        (["cost", SPEC], "cost is not built yet"),
+        (["cost", SPEC, "--target", "z80"], "target `z80` is unknown; write one of avr, cortex-m4f"),
     ],
 )
 def test_wrong_calls_exit_2(kfgen, folder, arguments, text):

@@ -38,8 +38,9 @@ ALLOWED = {
     "native": SPEC | {"files", "generate", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC | {"generate", "native", "override", "reference", "simulate", "status"},
+    "cost": SPEC | {"logs", "native", "status"},
     "commands": SPEC
-    | {"check", "files", "generate", "logs", "native", "override", "plot", "reference", "simulate", "status"},
+    | {"check", "cost", "files", "generate", "logs", "native", "override", "plot", "reference", "simulate", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
     "__main__": {"cli"},

@@ -1,4 +1,4 @@
-"""The exact cost of an emitted filter on a Cortex-M4F: instructions, flash, RAM, stack.
+"""An independent measurement of a filter on a Cortex-M4F, which shares no code with kfgen.cost.
 
 The C is cross-compiled by arm-none-eabi-gcc, linked with newlib, and run in the unicorn emulator, which counts
 every instruction between the call of a function and its return, those of library functions included. The
@@ -9,12 +9,10 @@ harness is in the figures.
 from __future__ import annotations
 
 import re
-import shutil
 import struct
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -47,17 +45,6 @@ class Cost:
     def step(self) -> float:
         """The instructions of one call of each function: the mean over the log."""
         return sum(sum(counts) / len(counts) for counts in self.instructions.values())
-
-
-def missing() -> list[str]:
-    """What a measurement needs and this machine does not have."""
-    return [GCC] * (shutil.which(GCC) is None) + [m for m in ("unicorn", "elftools") if find_spec(m) is None]
-
-
-def recommended_flags(header: str) -> list[str]:
-    """The compiler flags that an emitted header recommends for its file; [] if none."""
-    found = re.search(r"^ \*\s+(-O\S.*)$", header, re.MULTILINE)
-    return found[1].split() if found else []
 
 
 def measure(spec: Spec, files: Mapping[str, str], log: Log, flags: Sequence[str] = ()) -> Cost:

@@ -1,0 +1,124 @@
+"""What is to be measured: a filter's files, and the calls of its functions that a log asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kfgen.errors import KfgenError
+from kfgen.logs import Log, as_log
+from kfgen.native.header import Header, parse
+from kfgen.native.run import plan
+from kfgen.native.values import Units, value_of
+from kfgen.spec.types import Spec
+
+ROWS = 60
+"""Rows of a log that are run if not said otherwise."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A call of a function, and what its arguments are set to before: variable -> numbers of the scalar type."""
+
+    function: str
+    values: Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A filter to be measured.
+
+    functions: those that are called, and whether they count in the filter's flash. variables: the arguments'
+    variables, name -> C type. driver: C that declares them and has a function without arguments for each call.
+    """
+
+    name: str
+    scalar: str
+    files: Mapping[str, str]
+    functions: Mapping[str, bool]
+    variables: Mapping[str, str]
+    calls: Mapping[str, str]
+    steps: Sequence[Step]
+    rows: int
+
+    @property
+    def prefix(self) -> str:
+        """Of what the driver defines."""
+        return f"{self.name}_kfgen_"
+
+    def driver(self) -> str:
+        """The C that stands around the filter: global arguments, and a function without arguments for each call."""
+        p = self.prefix
+        lines = [f'#include "{self.name}.h"', f"{self.name}_t {p}kf;", f"uint32_t {p}status;"]
+        lines += [f"{kind} {p}{variable};" for variable, kind in self.variables.items()]
+        lines += [f"const uint32_t {p}size = sizeof({self.name}_t);"]
+        for function, call in self.calls.items():
+            lines += [f"void {p}{function}(void);", f"void {p}{function}(void) {{ {p}status = (uint32_t){call}; }}"]
+        return "\n".join(lines) + "\n"
+
+
+def make_job(spec: Spec, files: Mapping[str, str], log: Log, rows: int = ROWS) -> Job:
+    """The first `rows` rows of a log as calls, as `kfgen run` makes them. KfgenError for a log that does not fit."""
+    header = parse(files[f"{spec.name}.h"], spec.name)
+    log = as_log(log, spec)
+    log = Log({name: column[:rows] for name, column in log.columns.items()}, min(rows, log.rows), log.source)
+    functions = {"predict": True}
+    for sensor in spec.measurements:
+        functions[f"update_{sensor.name}"] = True
+        if header.has(f"update_{sensor.name}_masked"):
+            functions[f"update_{sensor.name}_masked"] = False
+    sources = {f"{spec.name}.{ending}": files[f"{spec.name}.{ending}"] for ending in ("h", "c")}
+    return Job(
+        spec.name, spec.scalar, sources, functions, _variables(spec, header, functions),
+        _calls(spec.name, header, ["init", *functions]), _steps(spec, header, log), log.rows,
+    )  # fmt: skip
+
+
+def _variables(spec: Spec, header: Header, functions: Mapping[str, bool]) -> dict[str, str]:
+    taken = {argument for function in functions for argument in header.functions[f"{spec.name}_{function}"]}
+    kinds = {"u": f"{spec.name}_inputs_t", "dt": f"{spec.name}_real_t", "mask": "uint32_t"}
+    variables = {name: kind for name, kind in kinds.items() if name in taken}
+    return variables | {f"z_{sensor.name}": f"{spec.name}_{sensor.name}_t" for sensor in spec.measurements}
+
+
+def _calls(name: str, header: Header, functions: Sequence[str]) -> dict[str, str]:
+    """function -> the C expression that calls it."""
+    calls = {}
+    for function in functions:
+        sensor = function.removeprefix("update_")
+        sensor = sensor if header.declares(f"{sensor}_t") else sensor.removesuffix("_masked")
+        p = f"{name}_kfgen_"
+        spelled = {"kf": f"&{p}kf", "u": f"&{p}u", "dt": f"{p}dt", "mask": f"{p}mask", "z": f"&{p}z_{sensor}"}
+        arguments = header.functions[f"{name}_{function}"]
+        if any(argument not in spelled for argument in arguments):
+            raise KfgenError(f"{name}_{function} has an argument that is not understood: {', '.join(arguments)}")
+        calls[function] = f"{name}_{function}({', '.join(spelled[a] for a in arguments)})"
+    return calls
+
+
+def _steps(spec: Spec, header: Header, log: Log) -> list[Step]:
+    work = plan(spec, log)
+    scalar = value_of(header)
+    units = Units(spec, scalar)
+    steps: list[Step] = []
+    for row in range(log.rows):
+        u = {"u": scalar.to_raw(work.u[row], units.u)} if spec.inputs else {}
+        if work.step[row]:
+            steps.append(Step("predict", {**u, "dt": scalar.to_raw(work.dt[row : row + 1], units.dt)}))
+        first = 0
+        for i, sensor in enumerate(spec.measurements):
+            last = first + len(sensor.components)
+            bits, full = int(work.mask[row, i]), (1 << (last - first)) - 1
+            if bits:
+                z = {f"z_{sensor.name}": scalar.to_raw(work.z[row, first:last], units.z[sensor.name])}
+                if bits == full:
+                    steps.append(Step(f"update_{sensor.name}", {**u, **z}))
+                else:
+                    mask = {"mask": np.array([bits], dtype=np.uint32)}
+                    steps.append(Step(f"update_{sensor.name}_masked", {**u, **z, **mask}))
+            first = last
+    return steps
