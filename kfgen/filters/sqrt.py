@@ -222,7 +222,7 @@ class Sqrt:
     def store(self, t: Trace, P: Rows, names: list[str], after_predict: bool) -> None:
         for i in reversed(range(self.n)):
             for j in reversed(range(i, self.n)):
-                t.store("kf.S", self.packed(i, j), t.name(P[i][j], f"s_{names[i]}_{names[j]}"))
+                t.store("kf.S", self.packed(i, j), t.name(t.value(P[i][j]), f"s_{names[i]}_{names[j]}"))
 
     def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
         """The root in and out."""

@@ -166,9 +166,9 @@ class UD:
         U, D = P
         for j in range(self.n):
             for i in range(j):
-                t.store("kf.U", packed(i, j), t.name(U[i][j], f"u_{names[i]}_{names[j]}"))
+                t.store("kf.U", packed(i, j), t.name(t.value(U[i][j]), f"u_{names[i]}_{names[j]}"))
         for j in range(self.n):
-            t.store("kf.D", j, t.name(D[j], f"d_{names[j]}"))
+            t.store("kf.D", j, t.name(t.value(D[j]), f"d_{names[j]}"))
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> tuple[Rows, Vector]:
         return U, D

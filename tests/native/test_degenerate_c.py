@@ -13,7 +13,10 @@ import pytest
 from emitted import problems
 from variants import FORMS, built, spec_with
 
+from kfgen.check import check
+from kfgen.override import override
 from kfgen.reference import reference
+from kfgen.spec import loads
 from kfgen.status import ERROR, Status
 
 # exact sensors of one state, the second a repetition; a P0 of rank 2, a state that is known
@@ -181,3 +184,22 @@ def test_a_Q_of_nothing_learns(form):
         for sensor in sensors:
             assert kf.update(sensor, [1.0]) == ref.update(sensor, [1.0]) == 0
             np.testing.assert_allclose(kf.Q, ref.Q, atol=1e-12 * np.max(ref.Q), rtol=0, err_msg=str(sensors))
+
+
+FORGETFUL = """
+kfgen: 1
+name: forgetful
+dt: 0.1
+states: {a: {init: 3, std: 0.1}, b: {init: 1, std: 0.5}, c: {init: 5, var: 0}}
+inputs: {push: {range: [-1, 1]}}
+dynamics: {form: discrete, f: {a: a + dt*b, b: push, c: push*dt}, Q: {a: 0.01}}
+measurements: {both: {z: {a: {h: a, std: 0.5}, d: {h: b*push + c + a, std: 0.5}}}}
+filter: {type: ekf}
+"""
+
+
+@pytest.mark.parametrize("covariance", ["ud", "full", "sqrt"])
+def test_states_that_a_step_sets_to_an_input(covariance):
+    """After predict they are known exactly and correlated with nothing, structurally."""
+    outcome = check(override(loads(FORGETFUL), filter={"covariance": covariance}), steps=60)
+    assert outcome.passed, outcome.text()
