@@ -5,18 +5,34 @@
 #error "battery tests for NaN and infinity, which -ffast-math removes"
 #endif
 
-static const battery_real_t battery_table0_x[25] = {
+/* constants: in flash on AVR too, where what is only const takes RAM */
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define BATTERY_flash PROGMEM
+static battery_real_t battery_read(const battery_real_t *from)
+{
+    battery_real_t value;
+    memcpy_P(&value, from, sizeof value);
+    return value;
+}
+#define BATTERY_at(array, i) battery_read(&(array)[i])
+#else
+#define BATTERY_flash
+#define BATTERY_at(array, i) (array)[i]
+#endif
+
+static const battery_real_t battery_table0_x[25] BATTERY_flash = {
     -0.05f, -0.05f, 0.02f, 0.04f, 0.06f, 0.08f, 0.1f, 0.13f, 0.16f, 0.2f, 0.25f, 0.3f, 0.35f,
     0.4f, 0.5f, 0.6f, 0.7f, 0.8f, 0.88f, 0.92f, 0.95f, 0.97f, 0.98f, 0.99f, 1.05f
 };
 
-static const battery_real_t battery_table0_y[25] = {
+static const battery_real_t battery_table0_y[25] BATTERY_flash = {
     1.415f, 1.415f, 2.535f, 2.855f, 2.984f, 3.066f, 3.133f, 3.1955f, 3.2019f, 3.223f, 3.2411f,
     3.2546f, 3.2656f, 3.2867f, 3.2965f, 3.3013f, 3.313f, 3.3335f, 3.3407f, 3.3555f, 3.3592f,
     3.3767f, 3.4026f, 3.4328f, 4.279f
 };
 
-static const battery_real_t battery_table0_slope[25] = {
+static const battery_real_t battery_table0_slope[25] BATTERY_flash = {
     0.0f, 16.0f, 16.0f, 6.45f, 4.1f, 3.35f, 2.0833333f, 0.21333334f, 0.5275f, 0.362f, 0.27f,
     0.22f, 0.422f, 0.098f, 0.048f, 0.117f, 0.205f, 0.09f, 0.37f, 0.123333335f, 0.875f, 2.59f,
     3.02f, 14.103333f, 0.0f
@@ -32,7 +48,7 @@ static bool battery_finite(float a)
 static int battery_segment(float a, const float x[], int n)
 {
     int i = 0;
-    while (i < n && x[i + 1] <= a) { i++; }
+    while (i < n && BATTERY_at(x, i + 1) <= a) { i++; }
     return i;
 }
 
@@ -119,10 +135,10 @@ battery_status_t battery_update_terminal(battery_t *kf,
     const float v_fast = kf->x[BATTERY_V_FAST];
     const float v_slow = kf->x[BATTERY_V_SLOW];
     const int t0 = battery_segment(soc, battery_table0_x, 24);
-    const float h_voltage = (battery_table0_y[t0]
-        + battery_table0_slope[t0] * (soc - battery_table0_x[t0])) - v_fast - v_slow
-        - 0.0098f * u->current;
-    const float h_voltage_soc = battery_table0_slope[t0];
+    const float h_voltage = (BATTERY_at(battery_table0_y, t0)
+        + BATTERY_at(battery_table0_slope, t0) * (soc - BATTERY_at(battery_table0_x, t0))) - v_fast
+        - v_slow - 0.0098f * u->current;
+    const float h_voltage_soc = BATTERY_at(battery_table0_slope, t0);
     const float y_voltage = z->voltage - h_voltage;
     const float t1 = 0.0004f + 0.01f * h_voltage_soc * h_voltage_soc;
 

@@ -5,8 +5,18 @@
 #error "cv2d tests for NaN and infinity, which -ffast-math removes"
 #endif
 
+/* constants: in flash on AVR too, where what is only const takes RAM */
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define CV2D_flash PROGMEM
+#define CV2D_order(i) pgm_read_byte(&cv2d_order[i])
+#else
+#define CV2D_flash
+#define CV2D_order(i) cv2d_order[i]
+#endif
+
 /* inner position -> index into x */
-static const uint8_t cv2d_order[4] = { 0, 2, 1, 3 };
+static const uint8_t cv2d_order[4] CV2D_flash = { 0, 2, 1, 3 };
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool cv2d_finite(float a)
@@ -255,9 +265,9 @@ cv2d_status_t cv2d_set_covariance(cv2d_t *kf, const cv2d_real_t P[16])
     /* the upper triangle, column by column */
     for (int j = 0; j < 4; j++) {
         for (int i = 0; i < j + 1; i++) {
-            const bool t0 = cv2d_order[j] < cv2d_order[i];
-            const float value = P[4 * (t0 ? cv2d_order[j] : cv2d_order[i])
-                + (t0 ? cv2d_order[i] : cv2d_order[j])];
+            const bool t0 = CV2D_order(j) < CV2D_order(i);
+            const float value = P[4 * (t0 ? CV2D_order(j) : CV2D_order(i))
+                + (t0 ? CV2D_order(i) : CV2D_order(j))];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
             if (!cv2d_finite(value)) { return CV2D_NOT_FINITE; }
@@ -308,8 +318,8 @@ void cv2d_get_covariance(const cv2d_t *kf, cv2d_real_t P[16])
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
             const float value = sum;
-            P[4 * cv2d_order[i] + cv2d_order[j]] = value;
-            P[4 * cv2d_order[j] + cv2d_order[i]] = value;
+            P[4 * CV2D_order(i) + CV2D_order(j)] = value;
+            P[4 * CV2D_order(j) + CV2D_order(i)] = value;
         }
     }
 }

@@ -5,8 +5,18 @@
 #error "cv4 tests for NaN and infinity, which -ffast-math removes"
 #endif
 
+/* constants: in flash on AVR too, where what is only const takes RAM */
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define CV4_flash PROGMEM
+#define CV4_order(i) pgm_read_byte(&cv4_order[i])
+#else
+#define CV4_flash
+#define CV4_order(i) cv4_order[i]
+#endif
+
 /* inner position -> index into x */
-static const uint8_t cv4_order[4] = { 0, 2, 1, 3 };
+static const uint8_t cv4_order[4] CV4_flash = { 0, 2, 1, 3 };
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool cv4_finite(float a)
@@ -214,9 +224,9 @@ cv4_status_t cv4_set_covariance(cv4_t *kf, const cv4_real_t P[16])
     /* the upper triangle, column by column */
     for (int j = 0; j < 4; j++) {
         for (int i = 0; i < j + 1; i++) {
-            const bool t0 = cv4_order[j] < cv4_order[i];
-            const float value = P[4 * (t0 ? cv4_order[j] : cv4_order[i])
-                + (t0 ? cv4_order[i] : cv4_order[j])];
+            const bool t0 = CV4_order(j) < CV4_order(i);
+            const float value = P[4 * (t0 ? CV4_order(j) : CV4_order(i))
+                + (t0 ? CV4_order(i) : CV4_order(j))];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
             if (!cv4_finite(value)) { return CV4_NOT_FINITE; }
@@ -267,8 +277,8 @@ void cv4_get_covariance(const cv4_t *kf, cv4_real_t P[16])
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
             const float value = sum;
-            P[4 * cv4_order[i] + cv4_order[j]] = value;
-            P[4 * cv4_order[j] + cv4_order[i]] = value;
+            P[4 * CV4_order(i) + CV4_order(j)] = value;
+            P[4 * CV4_order(j) + CV4_order(i)] = value;
         }
     }
 }

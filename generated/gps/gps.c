@@ -7,8 +7,18 @@
 #error "gps tests for NaN and infinity, which -ffast-math removes"
 #endif
 
+/* constants: in flash on AVR too, where what is only const takes RAM */
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define GPS_flash PROGMEM
+#define GPS_order(i) pgm_read_byte(&gps_order[i])
+#else
+#define GPS_flash
+#define GPS_order(i) gps_order[i]
+#endif
+
 /* inner position -> index into x */
-static const uint8_t gps_order[5] = { 4, 3, 0, 1, 2 };
+static const uint8_t gps_order[5] GPS_flash = { 4, 3, 0, 1, 2 };
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool gps_finite(double a)
@@ -396,9 +406,9 @@ gps_status_t gps_set_covariance(gps_t *kf, const gps_real_t P[25])
     /* the upper triangle, column by column */
     for (int j = 0; j < 5; j++) {
         for (int i = 0; i < j + 1; i++) {
-            const bool t0 = gps_order[j] < gps_order[i];
-            const double value = P[5 * (t0 ? gps_order[j] : gps_order[i])
-                + (t0 ? gps_order[i] : gps_order[j])];
+            const bool t0 = GPS_order(j) < GPS_order(i);
+            const double value = P[5 * (t0 ? GPS_order(j) : GPS_order(i))
+                + (t0 ? GPS_order(i) : GPS_order(j))];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
             if (!gps_finite(value)) { return GPS_NOT_FINITE; }
@@ -449,8 +459,8 @@ void gps_get_covariance(const gps_t *kf, gps_real_t P[25])
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
             const double value = sum;
-            P[5 * gps_order[i] + gps_order[j]] = value;
-            P[5 * gps_order[j] + gps_order[i]] = value;
+            P[5 * GPS_order(i) + GPS_order(j)] = value;
+            P[5 * GPS_order(j) + GPS_order(i)] = value;
         }
     }
 }

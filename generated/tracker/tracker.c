@@ -7,8 +7,18 @@
 #error "tracker tests for NaN and infinity, which -ffast-math removes"
 #endif
 
+/* constants: in flash on AVR too, where what is only const takes RAM */
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define TRACKER_flash PROGMEM
+#define TRACKER_order(i) pgm_read_byte(&tracker_order[i])
+#else
+#define TRACKER_flash
+#define TRACKER_order(i) tracker_order[i]
+#endif
+
 /* inner position -> index into x */
-static const uint8_t tracker_order[4] = { 0, 2, 1, 3 };
+static const uint8_t tracker_order[4] TRACKER_flash = { 0, 2, 1, 3 };
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool tracker_finite(float a)
@@ -465,9 +475,9 @@ tracker_status_t tracker_set_covariance(tracker_t *kf, const tracker_real_t P[16
     /* the upper triangle, column by column */
     for (int j = 0; j < 4; j++) {
         for (int i = 0; i < j + 1; i++) {
-            const bool t0 = tracker_order[j] < tracker_order[i];
-            const float value = P[4 * (t0 ? tracker_order[j] : tracker_order[i])
-                + (t0 ? tracker_order[i] : tracker_order[j])];
+            const bool t0 = TRACKER_order(j) < TRACKER_order(i);
+            const float value = P[4 * (t0 ? TRACKER_order(j) : TRACKER_order(i))
+                + (t0 ? TRACKER_order(i) : TRACKER_order(j))];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
             if (!tracker_finite(value)) { return TRACKER_NOT_FINITE; }
@@ -518,8 +528,8 @@ void tracker_get_covariance(const tracker_t *kf, tracker_real_t P[16])
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
             const float value = sum;
-            P[4 * tracker_order[i] + tracker_order[j]] = value;
-            P[4 * tracker_order[j] + tracker_order[i]] = value;
+            P[4 * TRACKER_order(i) + TRACKER_order(j)] = value;
+            P[4 * TRACKER_order(j) + TRACKER_order(i)] = value;
         }
     }
 }

@@ -7,8 +7,18 @@
 #error "vehicle tests for NaN and infinity, which -ffast-math removes"
 #endif
 
+/* constants: in flash on AVR too, where what is only const takes RAM */
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define VEHICLE_flash PROGMEM
+#define VEHICLE_order(i) pgm_read_byte(&vehicle_order[i])
+#else
+#define VEHICLE_flash
+#define VEHICLE_order(i) vehicle_order[i]
+#endif
+
 /* inner position -> index into x */
-static const uint8_t vehicle_order[5] = { 0, 1, 2, 4, 3 };
+static const uint8_t vehicle_order[5] VEHICLE_flash = { 0, 1, 2, 4, 3 };
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool vehicle_finite(float a)
@@ -475,9 +485,9 @@ vehicle_status_t vehicle_set_covariance(vehicle_t *kf, const vehicle_real_t P[25
     /* the upper triangle, column by column */
     for (int j = 0; j < 5; j++) {
         for (int i = 0; i < j + 1; i++) {
-            const bool t0 = vehicle_order[j] < vehicle_order[i];
-            const float value = P[5 * (t0 ? vehicle_order[j] : vehicle_order[i])
-                + (t0 ? vehicle_order[i] : vehicle_order[j])];
+            const bool t0 = VEHICLE_order(j) < VEHICLE_order(i);
+            const float value = P[5 * (t0 ? VEHICLE_order(j) : VEHICLE_order(i))
+                + (t0 ? VEHICLE_order(i) : VEHICLE_order(j))];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
             if (!vehicle_finite(value)) { return VEHICLE_NOT_FINITE; }
@@ -528,8 +538,8 @@ void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25])
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
             const float value = sum;
-            P[5 * vehicle_order[i] + vehicle_order[j]] = value;
-            P[5 * vehicle_order[j] + vehicle_order[i]] = value;
+            P[5 * VEHICLE_order(i) + VEHICLE_order(j)] = value;
+            P[5 * VEHICLE_order(j) + VEHICLE_order(i)] = value;
         }
     }
 }

@@ -7,8 +7,18 @@
 #error "vehicle_tutorial tests for NaN and infinity, which -ffast-math removes"
 #endif
 
+/* constants: in flash on AVR too, where what is only const takes RAM */
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define VEHICLE_TUTORIAL_flash PROGMEM
+#define VEHICLE_TUTORIAL_order(i) pgm_read_byte(&vehicle_tutorial_order[i])
+#else
+#define VEHICLE_TUTORIAL_flash
+#define VEHICLE_TUTORIAL_order(i) vehicle_tutorial_order[i]
+#endif
+
 /* inner position -> index into x */
-static const uint8_t vehicle_tutorial_order[4] = { 0, 2, 1, 3 };
+static const uint8_t vehicle_tutorial_order[4] VEHICLE_TUTORIAL_flash = { 0, 2, 1, 3 };
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool vehicle_tutorial_finite(float a)
@@ -242,9 +252,9 @@ vehicle_tutorial_status_t vehicle_tutorial_set_covariance(vehicle_tutorial_t *kf
     /* the upper triangle, column by column */
     for (int j = 0; j < 4; j++) {
         for (int i = 0; i < j + 1; i++) {
-            const bool t0 = vehicle_tutorial_order[j] < vehicle_tutorial_order[i];
-            const float value = P[4 * (t0 ? vehicle_tutorial_order[j] : vehicle_tutorial_order[i])
-                + (t0 ? vehicle_tutorial_order[i] : vehicle_tutorial_order[j])];
+            const bool t0 = VEHICLE_TUTORIAL_order(j) < VEHICLE_TUTORIAL_order(i);
+            const float value = P[4 * (t0 ? VEHICLE_TUTORIAL_order(j) : VEHICLE_TUTORIAL_order(i))
+                + (t0 ? VEHICLE_TUTORIAL_order(i) : VEHICLE_TUTORIAL_order(j))];
             p[j * (j + 1) / 2 + i] = value;
             w[j * (j + 1) / 2 + i] = value;
             if (!vehicle_tutorial_finite(value)) { return VEHICLE_TUTORIAL_NOT_FINITE; }
@@ -295,8 +305,8 @@ void vehicle_tutorial_get_covariance(const vehicle_tutorial_t *kf, vehicle_tutor
                 sum = sum + kf->U[k * (k - 1) / 2 + i] * kf->D[k] * kf->U[k * (k - 1) / 2 + j];
             }
             const float value = sum;
-            P[4 * vehicle_tutorial_order[i] + vehicle_tutorial_order[j]] = value;
-            P[4 * vehicle_tutorial_order[j] + vehicle_tutorial_order[i]] = value;
+            P[4 * VEHICLE_TUTORIAL_order(i) + VEHICLE_TUTORIAL_order(j)] = value;
+            P[4 * VEHICLE_TUTORIAL_order(j) + VEHICLE_TUTORIAL_order(i)] = value;
         }
     }
 }

@@ -55,6 +55,8 @@ class Printer:
                 return self._constant(node)
             case "field":
                 return self._path(node.data), _ATOM
+            case "element" if node.kind == "int":  # a table of indices
+                return f"{self.prefix.upper()}{node.data.removeprefix(self.prefix)}({e(node.args[0])})", _ATOM
             case "element":
                 return f"{self._path(node.data)}[{self._index(node.data, node.args[0])}]", _ATOM
             case "read":
@@ -66,17 +68,18 @@ class Printer:
             case "real":
                 return f"({self.scalar.c_type}){e(node.args[0], _ATOM)}", _UNARY
             case "lookup":
-                return f"{self.tables[node.data]}[{e(node.args[0])}]", _ATOM
+                return self._constant_at(self.tables[node.data], e(node.args[0])), _ATOM
             case "bit":
                 path, place = node.data
                 return f"({self._path(path)} & 0x{1 << place:x}u) != 0u", _RELATION
             case "half":
                 return f"{e(node.args[0], _PRODUCT)} / 2", _PRODUCT
             case "slope":
-                return f"{self.tables[node.data]}_slope[{e(node.args[0])}]", _ATOM
+                return self._constant_at(f"{self.tables[node.data]}_slope", e(node.args[0])), _ATOM
             case "table":
                 name, i = self.tables[node.data], e(node.args[0])
-                return f"{name}_y[{i}] + {name}_slope[{i}] * ({e(node.args[1])} - {name}_x[{i}])", _SUM
+                y, slope, x = (self._constant_at(f"{name}_{part}", i) for part in ("y", "slope", "x"))
+                return f"{y} + {slope} * ({e(node.args[1])} - {x})", _SUM
             case "add":
                 return f"{e(node.args[0], _SUM)} + {e(node.args[1], _PRODUCT)}", _SUM
             case "sub":
@@ -106,6 +109,10 @@ class Printer:
                 return f"{c} ? {a} : {b}", _TERNARY
             case _:
                 return self._call(node), _ATOM
+
+    def _constant_at(self, array: str, index: str) -> str:
+        """An entry of a constant array, which not every processor can read like others."""
+        return f"{self.prefix.upper()}_at({array}, {index})"
 
     def _alternative(self, node: Node) -> str:
         """A side of ||: a chain of them as it is, && in parentheses for the reader's (and gcc's) sake."""

@@ -40,11 +40,17 @@ def _environment() -> Environment:
 
 def render(view: View) -> dict[str, str]:
     """File name -> text."""
-    environment = _environment()
-    return {
-        f"{view.name}.{suffix}": _tidy(environment.get_template(f"filter.{suffix}.j2").render(v=view))
-        for suffix in ("h", "c")
-    }
+    return {f"{view.name}.{suffix}": render_c(f"filter.{suffix}.j2", v=view) for suffix in ("h", "c")}
+
+
+def render_c(template: str, **names: Any) -> str:
+    """The C text of a template."""
+    return _tidy(render_text(template, **names))
+
+
+def render_text(template: str, **names: Any) -> str:
+    """The text of a template as it stands, for what is not C."""
+    return _environment().get_template(template).render(**names)
 
 
 def _tidy(text: str) -> str:

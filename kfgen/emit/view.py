@@ -62,6 +62,7 @@ class Data:
     comment: str = ""
     size: int = 0
     values: str = ""
+    reader: str = ""  # the macro that reads an entry
     lines: tuple[str, ...] = ()
 
 
@@ -193,8 +194,8 @@ class _ViewMaker:
             ),
             functions=functions,
             constants=tuple(
-                Data(name=f"{self.name}_{key}", comment="inner position -> index into x", size=len(values),
-                     values="{ " + ", ".join(map(str, values)) + " }")
+                Data(name=f"{self.name}_{key}", reader=f"{self.NAME}_{key}", comment="inner position -> index into x",
+                     size=len(values), values="{ " + ", ".join(map(str, values)) + " }")
                 for key, values in code.constants.items()
             ),
             tables=tuple(self.table_data()),
