@@ -19,6 +19,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,19 @@ from kfgen.spec.types import Matrix, Noise, Sensor, Spec
 
 Array = NDArray[np.float64]
 
+
+class Draws(Protocol):
+    """Where random numbers come from: these methods of numpy's Generator."""
+
+    def random(self) -> float: ...
+
+    def uniform(self, low: float, high: float, size: int) -> Array: ...
+
+    def standard_normal(self, size: int) -> Array: ...
+
+    def choice(self, a: int, *, p: Array) -> int: ...
+
+
 STEPS = 500
 JITTER = 0.1
 
@@ -47,11 +61,13 @@ def simulate(
     seed: int = 0,
     every: Mapping[str, int] | None = None,
     gaps: float = 0.0,
+    draws: Draws | None = None,
 ) -> Log:
     """A log of `steps` rows, the truth in columns `true.<state>`; the same for the same seed.
 
     every: sensor -> it measures in each so many-th row only (default 1). gaps: the share of readings that are
-    lost at random. Raises KfgenError where the model leaves the finite numbers, or a covariance is none.
+    lost at random. draws: random numbers in place of numpy's (`seed` is not used then). Raises KfgenError where the
+    model leaves the finite numbers, or a covariance is none.
     """
     if steps < 1:
         raise KfgenError(f"a log needs at least one step, not {steps}")
@@ -59,7 +75,7 @@ def simulate(
     if unknown:
         known = ", ".join(sensor.name for sensor in spec.measurements)
         raise KfgenError(f"unknown sensor `{unknown[0]}` (known: {known})")
-    random = np.random.default_rng(seed)
+    random = cast(Draws, np.random.default_rng(seed)) if draws is None else draws
     try:
         with np.errstate(all="ignore"):
             return _simulate(spec, steps, random, every or {}, gaps)
@@ -68,7 +84,7 @@ def simulate(
         raise KfgenError(f"{spec.name}: the model met {reason} on its own track; try another --seed") from None
 
 
-def _simulate(spec: Spec, steps: int, random: np.random.Generator, every: Mapping[str, int], gaps: float) -> Log:
+def _simulate(spec: Spec, steps: int, random: Draws, every: Mapping[str, int], gaps: float) -> Log:
     worlds = [_World(each) for each in mode_specs(spec)]
     model = worlds[0].model
     t, dt = _times(spec, model, steps, random)
@@ -128,12 +144,12 @@ class _World:
         quiet = replace(sensor, noise=silent, noise_covariance=covariance)
         return _Meter(sensor, SensorModel(self.model, sensor), SensorModel(self.model, quiet))
 
-    def initial(self, random: np.random.Generator) -> Array:
+    def initial(self, random: Draws) -> Array:
         """A draw of the first state [n]."""
         model = self.model
         return self._placed(model.x0 + _draw(model.P0, random))
 
-    def step(self, x: Array, context: Context, random: np.random.Generator) -> Array:
+    def step(self, x: Array, context: Context, random: Draws) -> Array:
         """The state [n] after a step with drawn noise."""
         Qw = self._noise(self.model.environment(context, x))[np.ix_(self._held, self._held)]
         after = self._process.advance(x, _draw(Qw, random), context)
@@ -142,7 +158,7 @@ class _World:
             raise KfgenError(f"{self.spec.name}: the simulated state left the finite numbers; try another --seed")
         return self._placed(after)
 
-    def measure(self, name: str, x: Array, context: Context, random: np.random.Generator) -> Array:
+    def measure(self, name: str, x: Array, context: Context, random: Draws) -> Array:
         """A drawn reading [m] of a sensor at the state x [n]."""
         meter = self._meters[name]
         used = tuple(range(meter.model.m))
@@ -160,7 +176,7 @@ class _World:
         return self.model.wrap(self.model.clip(x))
 
 
-def _draw(P: Array, random: np.random.Generator) -> Array:
+def _draw(P: Array, random: Draws) -> Array:
     """A draw from N(0, P); as many random numbers are used whatever P is, so that tracks stay comparable."""
     n = len(P)
     numbers = random.standard_normal(n)
@@ -189,7 +205,7 @@ def _zero(noise: Noise) -> Expression:
     return Expression(Number(Fraction(0)), "0", noise.place)
 
 
-def _times(spec: Spec, model: Model, steps: int, random: np.random.Generator) -> tuple[Array, Array]:
+def _times(spec: Spec, model: Model, steps: int, random: Draws) -> tuple[Array, Array]:
     """t [steps] of the rows and the step dt [steps] that leads to each."""
     if spec.dt is None:
         return np.arange(1.0, steps + 1), np.ones(steps)
@@ -198,7 +214,7 @@ def _times(spec: Spec, model: Model, steps: int, random: np.random.Generator) ->
         t = np.array([float((k + 1) * fixed) for k in range(steps)])
         return t, np.full(steps, float(fixed))
     nominal = model.number(spec.dt.nominal)
-    drawn = nominal * (1 + JITTER * random.uniform(-1, 1, steps))
+    drawn = nominal * (1 + JITTER * random.uniform(-1.0, 1.0, steps))
     low = -math.inf if spec.dt.minimum is None else model.number(spec.dt.minimum)
     high = math.inf if spec.dt.maximum is None else model.number(spec.dt.maximum)
     # a log's times are short decimals; what counts is the difference of the times as written
@@ -207,7 +223,7 @@ def _times(spec: Spec, model: Model, steps: int, random: np.random.Generator) ->
     return t, np.diff(t, prepend=0.0)
 
 
-def _inputs(spec: Spec, model: Model, steps: int, random: np.random.Generator) -> Array:
+def _inputs(spec: Spec, model: Model, steps: int, random: Draws) -> Array:
     """Smooth inputs [steps, inputs]."""
     u = np.empty((steps, len(spec.inputs)))
     k = np.arange(steps)
@@ -216,14 +232,14 @@ def _inputs(spec: Spec, model: Model, steps: int, random: np.random.Generator) -
         if each.range is not None:
             low, high = (model.number(limit) for limit in each.range)
             middle, amplitude = (low + high) / 2, (high - low) / 8
-        periods = 25 * 10 ** random.uniform(0, 1, 3)
-        phases = random.uniform(0, 2 * math.pi, 3)
+        periods = 25 * 10 ** random.uniform(0.0, 1.0, 3)
+        phases = random.uniform(0.0, 2 * math.pi, 3)
         waves = np.sin(2 * math.pi * k[:, None] / periods + phases)
         u[:, i] = middle + amplitude * waves.mean(axis=1)
     return u
 
 
-def _mode_track(spec: Spec, model: Model, dt: Array, random: np.random.Generator) -> list[int]:
+def _mode_track(spec: Spec, model: Model, dt: Array, random: Draws) -> list[int]:
     """The mode in each row. dt (rows,): the step that leads to it."""
     if spec.imm is None:
         return [0] * len(dt)

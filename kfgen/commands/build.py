@@ -25,11 +25,12 @@ class Built:
 
     spec: Spec
     generated: Generated
+    texts: Mapping[str, str]  # below the folder
     folder: Path
 
     @property
     def files(self) -> dict[Path, str]:
-        return {self.folder / name: text for name, text in self.generated.files.items()}
+        return {self.folder / name: text for name, text in self.texts.items()}
 
 
 @click.command(
@@ -37,6 +38,7 @@ class Built:
     epilog=example(
         "kfgen build specs/vehicle.yaml",
         "kfgen build specs/*.yaml -o src/filters",
+        "kfgen build specs/vehicle.yaml --selftest",
         "kfgen build --check specs/*.yaml",
     ),
 )
@@ -51,7 +53,10 @@ class Built:
     help="Write nothing; exit 1 with a unified diff when the files on disk are not what would be written.",
 )  # fmt: skip
 @click.option("--log", type=click.Path(path_type=Path), metavar="LOG", hidden=True)
-@click.option("--selftest", is_flag=True, hidden=True)
+@click.option(
+    "--selftest", is_flag=True,
+    help="Also write <name>_selftest.c, which replays a recorded run: <name>_selftest() is 0 where the filter works.",
+)  # fmt: skip
 @click.option("--layout", metavar="L", hidden=True)
 def build(
     specs: Sequence[Path],
@@ -66,10 +71,10 @@ def build(
 
     All specs are checked before anything is written.
     """
-    for option, given in (("--log", log), ("--selftest", selftest), ("--layout", layout)):
+    for option, given in (("--log", log), ("--layout", layout)):
         if given:
             raise KfgenError(f"build {option} is not built yet in this version")
-    built = generate_all(specs, directory, scalar)
+    built = generate_all(specs, directory, scalar, selftest)
     _warn(built)
     if only_check:
         sys.exit(1 if report_differences(built) else 0)
@@ -79,7 +84,9 @@ def build(
     click.echo(table(built))
 
 
-def generate_all(paths: Sequence[Path], directory: Path, scalar: str | None) -> list[Built]:
+def generate_all(
+    paths: Sequence[Path], directory: Path, scalar: str | None, selftest: bool = False
+) -> list[Built]:
     """Generate every spec; a SpecError holds the mistakes of all of them. KfgenError for two of one name."""
     specs: list[Spec] = []
     mistakes: list[Mistake] = []
@@ -101,7 +108,13 @@ def generate_all(paths: Sequence[Path], directory: Path, scalar: str | None) -> 
     built = []
     for spec in specs:
         try:
-            built.append(Built(spec, generate(spec), directory / spec.name))
+            generated = generate(spec)
+            texts = dict(generated.files)
+            if selftest:
+                from kfgen.selftest import selftest as recorded
+
+                texts |= recorded(spec, generated)
+            built.append(Built(spec, generated, texts, directory / spec.name))
         except SpecError as error:
             mistakes += error.mistakes
     if mistakes:

@@ -39,8 +39,10 @@ ALLOWED = {
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC | {"generate", "native", "override", "reference", "simulate", "status"},
     "cost": SPEC | {"logs", "native", "status"},
+    "selftest": SPEC | {"emit", "generate", "logs", "native", "reference", "scalars", "simulate"},
     "commands": SPEC
-    | {"check", "cost", "files", "generate", "logs", "native", "override", "plot", "reference", "simulate", "status"},
+    | {"check", "cost", "files", "generate", "logs", "native", "override", "plot", "reference", "selftest"}
+    | {"simulate", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
     "__main__": {"cli"},

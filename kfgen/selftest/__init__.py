@@ -1,0 +1,133 @@
+"""`<name>_selftest.c`: a filter that checks itself on the board, against a recorded run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from kfgen.emit.printer import WIDTH
+from kfgen.emit.render import render_c
+from kfgen.emit.view import View
+from kfgen.generate import Generated
+from kfgen.native.header import parse
+from kfgen.scalars import SCALARS, Scalar
+from kfgen.selftest.record import Record, record
+from kfgen.selftest.track import track_of
+from kfgen.spec.constants import value
+from kfgen.spec.types import Spec
+
+__all__ = ["selftest"]
+
+ULPS = 16
+"""Units in the last place of the largest |x| (and variance) that rounding may take, beside the tolerance."""
+
+
+@dataclass(frozen=True)
+class Array:
+    """A static const array of reals."""
+
+    name: str
+    about: str
+    size: int
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Update:
+    """A sensor's update: its components, where they stand in a step's readings; it comes in each `every`-th step."""
+
+    name: str
+    components: tuple[str, ...]
+    first: int
+    every: int
+    arguments: str
+
+
+@dataclass(frozen=True)
+class SelfTest:
+    """What the template sees."""
+
+    view: View
+    command: str
+    steps: int
+    inputs: tuple[str, ...]
+    sensors: tuple[Update, ...]
+    readings: int
+    predict: str
+    has_dt: bool
+    has_covariance: bool
+    periods: tuple[tuple[str, str], ...]
+    arrays: tuple[Array, ...]
+    exact: bool
+    part: str  # the tolerance, for the reader
+    tolerance: str
+    resolution: str
+    square: str  # of the part of |x| that stands for a standard deviation where there is no covariance
+    two: str
+    small: tuple[str, str] | None  # tolerance and resolution where a double has four bytes
+
+
+def selftest(spec: Spec, generated: Generated) -> dict[str, str]:
+    """{`<name>_selftest.c`: text}. Pure. Raises KfgenError where the model does not get through one step."""
+    found = record(spec, track_of(spec))
+    made = _view(spec, generated, found)
+    return {f"{spec.name}_selftest.c": render_c("selftest.c.j2", s=made, v=made.view)}
+
+
+def _view(spec: Spec, generated: Generated, found: Record) -> SelfTest:
+    scalar = SCALARS[spec.scalar]
+    header = parse(generated.files[f"{spec.name}.h"], spec.name)
+    track = found.track
+    sensors: list[Update] = []
+    first = 0
+    for sensor in spec.measurements:
+        takes_u = header.takes(f"update_{sensor.name}", "u")
+        names = tuple(component.name for component in sensor.components)
+        sensors.append(Update(sensor.name, names, first, 1 + len(sensors), ", &u" if takes_u else ""))
+        first += len(names)
+    takes = [name for name in ("u", "dt") if header.takes("predict", name)]
+    uses_u = "u" in takes or any(each.arguments for each in sensors)
+    arrays = [_array("readings", "all sensors' components, step by step", track.z.ravel(), scalar)]
+    if uses_u:
+        arrays.insert(0, _array("inputs", "u, step by step", track.u.ravel(), scalar))
+    if "dt" in takes:
+        arrays.insert(0, _array("steps", "dt", track.dt, scalar))
+    arrays.append(_array("states", "x after each step", found.x.ravel(), scalar))
+    arrays.append(_array("scale", "the largest |x| of each state", abs(found.x).max(axis=0), scalar))
+    if found.variance is not None:
+        largest = np.maximum(found.variance.max(axis=0), found.initial)
+        arrays.append(_array("spread", "the largest variance of each state", largest, scalar))
+        arrays.append(_array("variances", "the diagonal of P after each step", found.variance.ravel(), scalar))
+    kinds = [(state.name, state.period) for state in spec.states]
+    periods = [
+        (name, scalar.literal(Fraction(float(value(period.tree, spec)))))
+        for name, period in kinds
+        if period is not None
+    ]
+    resolution = ULPS * scalar.epsilon
+    return SelfTest(
+        generated.view, f"{generated.view.command} --selftest", len(found.x), tuple(i.name for i in spec.inputs) if
+        uses_u else (), tuple(sensors), first, "".join({"u": ", &u", "dt": ", dt"}[name] for name in takes),
+        "dt" in takes, found.variance is not None, tuple(periods), tuple(arrays), found.exact,
+        f"{found.tolerance:g}", scalar.literal(Fraction(str(found.tolerance))), scalar.literal(resolution),
+        scalar.literal(Fraction(1, 10000)), scalar.literal(Fraction(2)),
+        ("1e-2", "2e-6") if spec.scalar == "double" else None,
+    )  # fmt: skip
+
+
+def _array(name: str, about: str, numbers: Iterable[float], scalar: Scalar) -> Array:
+    texts = [scalar.literal(Fraction(float(number))) for number in numbers]
+    return Array(name, about, len(texts), tuple(_filled(texts)))
+
+
+def _filled(texts: Iterable[str]) -> Iterable[str]:
+    line = ""
+    for text in texts:
+        if line and len(line) + len(text) + 2 > WIDTH - 6:
+            yield line + ","
+            line = ""
+        line += f", {text}" if line else text
+    yield line

@@ -1,0 +1,113 @@
+"""What a filter has to answer along a track: from the reference for floating point.
+
+Where the model amplifies rounding, the record ends before a reference whose x is rounded to a float after every call
+departs from the one that is not; a self-test that fails then tells of the compiler or the processor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kfgen.errors import KfgenError
+from kfgen.reference import ReferenceFilter, reference
+from kfgen.reference.status import Status
+from kfgen.selftest.track import Track
+from kfgen.spec.types import Spec
+
+Array = NDArray[np.float64]
+
+TOLERANCES = {"float": 1e-2, "double": 1e-6}
+"""Largest error of x in sigma, and of a variance relative to itself."""
+
+
+FINEST = {"float": 2.0**-22, "double": 2.0**-44}
+"""What recorded states are multiples of, at least, relative to their size."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """The track, x [k, n] and the diagonal of P [k, n] after each step (None where a filter keeps no covariance).
+
+    exact: they are numbers of the scalar type that must come out to the bit; else tolerance says how near.
+    """
+
+    track: Track
+    x: Array
+    variance: Array | None
+    tolerance: float
+    initial: Array  # the diagonal of P before the first step [n]
+    exact: bool = False
+
+
+def record(spec: Spec, track: Track) -> Record:
+    """The record of a spec in floating point. KfgenError where not one step can be recorded."""
+    if spec.scalar not in TOLERANCES:
+        raise KfgenError(f"{spec.name}: a self-test of scalar {spec.scalar} is not built yet; use float or double")
+    tolerance = TOLERANCES[spec.scalar]
+    # rounded to a float's precision for double too: a self-test also runs where a double has four bytes
+    ref, coarse = reference(spec), reference(spec)
+    steady = spec.filter.gain is not None and spec.imm is None
+    n = len(spec.states)
+    initial = np.zeros(n) if steady else np.diag(ref.P).copy()
+    xs, variances = [], []
+    with np.errstate(all="ignore"):
+        for k in range(len(track.dt)):
+            if not _stepped(spec, ref, track, k) or not _stepped(spec, coarse, track, k, rounded=True):
+                break
+            variance = np.zeros(n) if steady else np.diag(ref.P).copy()
+            if not steady and not _near(ref, coarse, variance):
+                break
+            xs.append(ref.x.copy())
+            variances.append(variance)
+    if not xs:
+        raise KfgenError(f"{spec.name}: the reference does not get through one step of a simulated run")
+    x, variance = np.array(xs), np.array(variances)
+    sigma = np.sqrt(np.maximum(variance, 0.0))
+    # coarser than what another machine's libm may change, finer than what is tested
+    quantum = np.maximum(sigma * tolerance / 64, np.abs(x).max(axis=0) * FINEST[spec.scalar])
+    x = np.array([[_rounded(v, q) for v, q in zip(*rows, strict=True)] for rows in zip(x, quantum, strict=True)])
+    variance = np.array([[_rounded(v, abs(v) * tolerance / 64) for v in row] for row in variance])
+    return Record(track.first(len(x)), x, None if steady else variance, tolerance, initial)
+
+
+def _near(ref: ReferenceFilter, coarse: ReferenceFilter, variance: Array) -> bool:
+    error = np.abs(ref.x - coarse.x)
+    for i, period in ref.model.periods.items():
+        error[i] = abs(error[i] - round(error[i] / period) * period)
+    allowed = TOLERANCES["float"] / 8 * np.sqrt(np.maximum(variance, 0.0)) + 1e-6 * np.abs(ref.x)
+    apart = np.abs(np.diag(coarse.P) - variance) > TOLERANCES["float"] / 8 * variance + 1e-6 * np.max(variance)
+    return not (np.any(error > allowed) or np.any(apart))
+
+
+def _stepped(spec: Spec, kf: ReferenceFilter, track: Track, k: int, rounded: bool = False) -> bool:
+    """Make the calls of a step; False where one fails."""
+    for status in _statuses(spec, kf, track, k):
+        if status >= Status.ERROR or not np.all(np.isfinite(kf.x)):
+            return False
+        if rounded:
+            kf.set_state(kf.x.astype(np.float32).astype(np.float64))
+    return True
+
+
+def _statuses(spec: Spec, kf: ReferenceFilter, track: Track, k: int) -> Iterator[int]:
+    u = track.u[k] if spec.inputs else None
+    run_time = spec.dt is not None and spec.dt.run_time
+    yield kf.predict(u=u, dt=float(track.dt[k])) if run_time else kf.predict(u=u)
+    first = 0
+    for i, sensor in enumerate(spec.measurements):
+        last = first + len(sensor.components)
+        if k % (i + 1) == 0:
+            yield kf.update(sensor.name, track.z[k, first:last], u=u)
+        first = last
+
+
+def _rounded(value: float, quantum: float) -> float:
+    """To a multiple of the power of two below the quantum."""
+    if quantum <= 0 or not np.isfinite(quantum):
+        return float(value)
+    unit = 2.0 ** int(np.floor(np.log2(quantum)))
+    return float(round(value / unit) * unit)

@@ -1,0 +1,225 @@
+"""The emitted self-tests: they pass on the host and on emulated boards, and they notice what is wrong."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from kfgen.errors import KfgenError
+from kfgen.generate import build
+from kfgen.override import override
+from kfgen.selftest import selftest
+from kfgen.spec import load, loads
+
+ROOT = Path(__file__).parents[2]
+BOARDS = ROOT / "tests" / "boards"
+SPECS = sorted((ROOT / "specs").glob("*.yaml"))
+STRICT = [
+    "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow",
+    "-Wfloat-equal", "-Wundef", "-Werror",
+]  # fmt: skip
+EMBEDDED = ["-O1", "-std=gnu99", "-fno-math-errno", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections"]
+
+
+def files_of(spec) -> dict[str, str]:
+    generated = build(spec)
+    return {**generated.files, **selftest(spec, generated)}
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory):
+    """scalar -> a folder with every spec of the repository and a function `tests` that runs their self-tests."""
+    folders = {}
+    for scalar in ("own", "double"):
+        folder = folders[scalar] = tmp_path_factory.mktemp(scalar)
+        names = []
+        for path in SPECS:
+            spec = load(path)
+            spec = spec if scalar == "own" else override(spec, scalar)
+            names.append(spec.name)
+            for name, text in files_of(spec).items():
+                (folder / name).write_text(text)
+        _write_tests(folder, names)
+    return folders
+
+
+def _write_tests(folder: Path, names: list[str]) -> None:
+    """tests(): a bit for each filter that departs, in the order of the names."""
+    lines = [f"int {name}_selftest(void);" for name in names]
+    lines += ["int tests(void);", "int tests(void)", "{", "    int failed = 0;"]
+    lines += [f"    if ({name}_selftest() != 0) {{ failed |= {1 << i}; }}" for i, name in enumerate(names)]
+    (folder / "tests.c").write_text("\n".join([*lines, "    return failed;", "}", ""]))
+    (folder / "main.c").write_text("int tests(void);\nint main(void) { return tests(); }\n")
+
+
+def run(folder: Path, *command: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(part) for part in command], cwd=folder, capture_output=True, text=True, errors="replace", timeout=120
+    )
+
+
+def compiled(folder: Path, *command: str | Path) -> None:
+    done = run(folder, *command)
+    assert done.returncode == 0, done.stderr[:3000]
+
+
+def sources(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.glob("*.c") if path.name != "main.c")
+
+
+@pytest.mark.parametrize("scalar", ["own", "double"])
+def test_every_spec_passes_on_the_host(everything, scalar):
+    folder = everything[scalar]
+    compiled(folder, "cc", "-O1", "-std=c99", *STRICT, *sources(folder), "main.c", "-lm", "-o", "tests")
+    assert run(folder, "./tests").returncode == 0
+
+
+CORTEX = {
+    "m4f": ("mps2-an386", ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]),
+    "m3": ("mps2-an385", ["-mcpu=cortex-m3", "-mthumb"]),
+}
+
+
+@pytest.mark.parametrize("core", CORTEX)
+def test_every_spec_passes_on_an_emulated_cortex_m(everything, needs, core):
+    needs("arm-none-eabi-gcc", "qemu-system-arm")
+    folder = everything["own"]
+    board, machine = CORTEX[core]
+    compiled(
+        folder, "arm-none-eabi-gcc", *machine, *EMBEDDED, *sources(folder), "main.c", BOARDS / "cortex_m.c", "-lm",
+        "-specs=nosys.specs", "-nostartfiles", "-Wl,--section-start=.vectors=0,-Ttext=0x400",
+        "-Wl,-Tdata=0x20000000,-e,start,-u,vectors",
+        "-o", f"{core}.elf",
+    )  # fmt: skip
+    options = ["-nographic", "-semihosting-config", "enable=on,target=native", "-kernel", f"{core}.elf"]
+    assert run(folder, "qemu-system-arm", "-M", board, *options).returncode == 0
+
+
+def test_every_spec_passes_on_an_emulated_risc_v(everything, needs):
+    needs("riscv64-unknown-elf-gcc", "qemu-system-riscv32")
+    folder = everything["own"]
+    compiled(
+        folder, "riscv64-unknown-elf-gcc", "-march=rv32imc", "-mabi=ilp32", "--specs=picolibc.specs", *EMBEDDED,
+        *sources(folder), "main.c", BOARDS / "riscv.c", "-lm", "-nostartfiles",
+        "-Wl,--section-start=.vectors=0x80000000,--defsym=__flash=0x80001000,--defsym=__flash_size=0x200000",
+        "-Wl,--defsym=__ram=0x80200000,--defsym=__ram_size=0x100000,-e,_start", "-o", "riscv.elf",
+    )  # fmt: skip
+    options = ["-M", "virt", "-bios", "none", "-nographic", "-kernel", "riscv.elf"]
+    assert run(folder, "qemu-system-riscv32", *options).returncode == 0
+
+
+def test_every_spec_passes_on_an_emulated_avr(everything, needs):
+    """Constants stay in flash. A double has four bytes there, with which the receiver's position cannot be told."""
+    needs("avr-gcc", "simavr")
+    folder = everything["own"]
+    machine = ["-mmcu=atmega2560"]
+    compiled(folder, "avr-gcc", *machine, *EMBEDDED, *sources(folder), BOARDS / "avr.c", "-lm", "-o", "avr.elf")
+    told = run(folder, "simavr", "-m", "atmega2560", "-f", "16000000", "avr.elf")
+    assert re.findall(r"<(\d{4})>", told.stdout + told.stderr) == [
+        f"{1 << [path.stem for path in SPECS].index('gps'):04d}"
+    ]
+    data = run(folder, "avr-size", "-A", "avr.elf").stdout
+    used = sum(int(size) for name, size in re.findall(r"^\.(data|bss)\s+(\d+)", data, re.MULTILINE))
+    assert used < 64
+
+
+VARIETY = """
+kfgen: 1
+name: variety
+dt: {nominal: 0.1, min: 0.01, max: 1}
+parameters: {gain: 2}
+states:
+  a: {init: 3.1, std: 0.1, unit: rad, kind: angle}
+  b: {init: 1, std: 0.5}
+  c: {init: 5, var: 0}
+inputs: {push: {range: [-1, 1]}}
+dynamics: {form: discrete, f: {a: a + dt*b, b: b + dt*push*c}, Q: {b: 0.1*dt}}
+measurements:
+  turn: {z: {a: {h: a, std: 0.05, unit: rad, kind: angle}}}
+  speed: {partial: true, z: {b: {h: gain*b, std: 0.5}, d: {h: "b*push", std: 0.5}}, gate: {probability: 0.99}}
+filter: {type: ekf}
+"""
+STEADY = """
+kfgen: 1
+name: steady
+dt: 0.1
+states: {p: {init: 1, std: 1}, v: {init: 0, std: 1}}
+dynamics: {form: discrete, f: {p: p + dt*v, v: v}, Q: {v: 0.1}}
+measurements: {gnss: {z: {p: {h: p, std: 1}}}}
+filter: {type: kf, gain: steady}
+"""
+
+
+def built(folder: Path, files: dict[str, str], name: str, *options: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    for file, text in files.items():
+        (folder / file).write_text(text)
+    (folder / "main.c").write_text(f"int {name}_selftest(void);\nint main(void) {{ return {name}_selftest(); }}\n")
+    compiled(folder, "cc", *options, *sources(folder), "main.c", "-lm", "-o", "tests")
+    return folder
+
+
+@pytest.mark.parametrize(("text", "name"), [(VARIETY, "variety"), (STEADY, "steady")])
+def test_angles_exact_states_run_time_steps_and_steady_gains(tmp_path, text, name):
+    for scalar in ("float", "double"):
+        files = files_of(override(loads(text), scalar))
+        assert run(built(tmp_path / scalar, files, name, "-O1", "-std=c99", *STRICT), "./tests").returncode == 0
+
+
+def test_it_compiles_as_cplusplus(tmp_path):
+    files = files_of(loads(VARIETY))
+    for file, text in files.items():
+        (tmp_path / file).write_text(text)
+    (tmp_path / "main.cpp").write_text(
+        'extern "C" int variety_selftest(void);\nint main() { return variety_selftest(); }'
+    )
+    compiled(tmp_path, "g++", "-O1", "-Wall", "-Wextra", "-Werror", "-x", "c++", *sources(tmp_path), "main.cpp",
+             "-o", "tests")  # fmt: skip
+    assert run(tmp_path, "./tests").returncode == 0
+
+
+def numbers_of(text: str, array: str) -> list[str]:
+    return re.findall(rf"{array}\[\d+\][^{{]*{{(.*?)}};", text, re.DOTALL)[0].replace("\n", " ").split(",")
+
+
+@pytest.mark.parametrize("array", ["states", "variances"])
+def test_it_names_the_first_step_that_departs(tmp_path, array):
+    files = files_of(loads(VARIETY))
+    text = files["variety_selftest.c"]
+    numbers = numbers_of(text, f"variety_{array}")
+    at = 6 * 3 + 1  # b after the seventh step
+    wrong = [*numbers[:at], f" {float(numbers[at].strip().rstrip('f')) * 1.05 + 0.05:.8f}f", *numbers[at + 1 :]]
+    old, new = (re.sub(r"\s+", " ", ",".join(part)) for part in (numbers, wrong))
+    files["variety_selftest.c"] = re.sub(r"\s+(?=-?[\d.])", " ", text).replace(old.strip(), new.strip())
+    assert files["variety_selftest.c"].count(wrong[at].strip()) == 1
+    assert run(built(tmp_path, files, "variety", "-O1"), "./tests").returncode == 7
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("kf->x[VARIETY_B] = ", "kf->x[VARIETY_B] = 0.98f * "),  # a wrong prediction or update
+        ("kf->D[0] = ", "kf->D[0] = 1.05f * "),
+        ("return VARIETY_OK;", "return VARIETY_NOT_FINITE;"),
+    ],
+)
+def test_it_notices_a_wrong_filter(tmp_path, old, new):
+    files = files_of(loads(VARIETY))
+    assert old in files["variety.c"]
+    head, predict, rest = files["variety.c"].partition("variety_predict(")
+    files["variety.c"] = head + predict + rest.replace(old, new)
+    assert 1 <= run(built(tmp_path, files, "variety", "-O1"), "./tests").returncode <= 3
+
+
+def test_it_is_the_same_text_every_time_and_leaves_the_filter_alone():
+    spec = loads(VARIETY)
+    assert selftest(spec, build(spec)) == selftest(spec, build(spec))
+
+
+def test_what_cannot_be_recorded():
+    spec = loads(VARIETY.replace("b: b + dt*push*c", "b: b + log(push - 5)"))
+    with pytest.raises(KfgenError, match="variety"):
+        selftest(spec, build(spec))
