@@ -13,6 +13,7 @@ import click
 
 from kfgen.commands.options import aligned, example, load_spec, scalar_option
 from kfgen.errors import KfgenError, Mistake, SpecError
+from kfgen.layouts import Package, arrange, layouts
 
 if TYPE_CHECKING:
     from kfgen.generate import Generated
@@ -38,7 +39,7 @@ class Built:
     epilog=example(
         "kfgen build specs/vehicle.yaml",
         "kfgen build specs/*.yaml -o src/filters",
-        "kfgen build specs/vehicle.yaml --selftest",
+        "kfgen build specs/vehicle.yaml --selftest --layout cmake -o lib",
         "kfgen build --check specs/*.yaml",
     ),
 )
@@ -57,7 +58,10 @@ class Built:
     "--selftest", is_flag=True,
     help="Also write <name>_selftest.c, which replays a recorded run: <name>_selftest() is 0 where the filter works.",
 )  # fmt: skip
-@click.option("--layout", metavar="L", hidden=True)
+@click.option(
+    "--layout", type=click.Choice(layouts()), default="plain", show_default=True,
+    help="What the files are arranged for: a library of that build system.",
+)  # fmt: skip
 def build(
     specs: Sequence[Path],
     directory: Path,
@@ -65,16 +69,15 @@ def build(
     only_check: bool,
     log: Path | None,
     selftest: bool,
-    layout: str | None,
+    layout: str,
 ) -> None:
     """Write the C files of one or more specs to DIR/<name>/, and print what they take.
 
     All specs are checked before anything is written.
     """
-    for option, given in (("--log", log), ("--layout", layout)):
-        if given:
-            raise KfgenError(f"build {option} is not built yet in this version")
-    built = generate_all(specs, directory, scalar, selftest)
+    if log is not None:
+        raise KfgenError("build --log is not built yet in this version")
+    built = generate_all(specs, directory, scalar, selftest, layout)
     _warn(built)
     if only_check:
         sys.exit(1 if report_differences(built) else 0)
@@ -85,7 +88,7 @@ def build(
 
 
 def generate_all(
-    paths: Sequence[Path], directory: Path, scalar: str | None, selftest: bool = False
+    paths: Sequence[Path], directory: Path, scalar: str | None, selftest: bool = False, layout: str = "plain"
 ) -> list[Built]:
     """Generate every spec; a SpecError holds the mistakes of all of them. KfgenError for two of one name."""
     specs: list[Spec] = []
@@ -114,12 +117,35 @@ def generate_all(
                 from kfgen.selftest import selftest as recorded
 
                 texts |= recorded(spec, generated)
+            if layout != "plain":
+                texts = arrange(layout, _package(spec, generated, texts, layout))
             built.append(Built(spec, generated, texts, directory / spec.name))
         except SpecError as error:
             mistakes += error.mistakes
     if mistakes:
         raise SpecError(mistakes)
     return built
+
+
+def _package(spec: Spec, generated: Generated, texts: Mapping[str, str], layout: str) -> Package:
+    """What a layout arranges."""
+    from kfgen.cost.advice import recommended_flags
+    from kfgen.native.header import parse
+    from kfgen.spec.constants import value
+
+    header_text = texts[f"{spec.name}.h"]
+    header = parse(header_text, spec.name)
+    functions = ["predict", *(f"update_{sensor.name}" for sensor in spec.measurements)]
+    selftest = " --selftest" if f"{spec.name}_selftest.c" in texts else ""
+    return Package(
+        view=generated.view,
+        sources=texts,
+        command=f"{generated.view.command}{selftest} --layout {layout}",
+        flags=tuple(recommended_flags(header_text)),
+        step=1.0 if spec.dt is None else float(value(spec.dt.nominal.tree, spec)),
+        run_time=header.takes("predict", "dt"),
+        takes_inputs=tuple(name for name in functions if header.takes(name, "u")),
+    )
 
 
 def _warn(built: Sequence[Built]) -> None:

@@ -40,8 +40,9 @@ ALLOWED = {
     "check": SPEC | {"generate", "native", "override", "reference", "simulate", "status"},
     "cost": SPEC | {"logs", "native", "status"},
     "selftest": SPEC | {"emit", "generate", "logs", "native", "reference", "scalars", "simulate"},
+    "layouts": {"emit"},
     "commands": SPEC
-    | {"check", "cost", "files", "generate", "logs", "native", "override", "plot", "reference", "selftest"}
+    | {"check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference", "selftest"}
     | {"simulate", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},

@@ -1,0 +1,13 @@
+"""A library target of CMake, `<name>::<name>`; with a self-test, a test of CTest."""
+
+from __future__ import annotations
+
+from kfgen.emit.render import render_text
+from kfgen.layouts import Package
+
+
+def arrange(package: Package) -> dict[str, str]:
+    added = {"CMakeLists.txt": render_text("cmake_lists.j2", p=package)}
+    if package.selftest:
+        added["test/main.c"] = render_text("selftest_main.j2", p=package)
+    return {**package.sources, **added}

@@ -1,0 +1,211 @@
+"""Each layout, held against the tools (or the schemas) that it is made for."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import jsonschema
+import kconfiglib
+import pytest
+from click.testing import CliRunner
+from ruamel.yaml import YAML
+
+from kfgen.cli import cli
+from kfgen.layouts import layouts
+from tests.oracle import problems
+
+BOARDS = Path(__file__).parents[1] / "boards"
+SPEC = """
+kfgen: 1
+name: on
+description: "a \\"quoted\\" title # with = signs"
+dt: {nominal: 0.1, min: 0.01}
+states: {a: {init: 1, std: 1}, b: {init: 0, std: 1}, c: {init: 0, std: 1}}
+inputs: {push: {range: [-1, 1]}}
+dynamics: {form: discrete, f: {a: "a + dt*table(b, [-1, 0, 1], [-2, 0, 1])", b: b + dt*push}, Q: {a: 0.1, b: 0.1}}
+measurements:
+  one: {z: {x: {h: a + c, std: 0.5}}}
+  two: {z: {y: {h: a*push, std: 0.5}}}
+filter: {type: ekf}
+"""
+
+
+@pytest.fixture
+def build(tmp_path):
+    """Builds a spec in a layout: the folder of the filter."""
+
+    def call(layout: str, text: str = SPEC, *options: str) -> Path:
+        (tmp_path / "spec.yaml").write_text(text)
+        arguments = ["build", str(tmp_path / "spec.yaml"), "-o", str(tmp_path), "--layout", layout, *options]
+        result = CliRunner().invoke(cli, arguments)
+        assert result.exit_code == 0, result.output
+        again = CliRunner().invoke(cli, [*arguments, "--check"])
+        assert (again.exit_code, again.stdout) == (0, "")
+        (folder,) = (path for path in tmp_path.iterdir() if path.is_dir())
+        return folder
+
+    return call
+
+
+def run(folder: Path, *command: str | Path) -> str:
+    done = subprocess.run([str(part) for part in command], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_every_layout_is_tested():
+    assert layouts() == ["arduino", "cmake", "plain", "platformio", "zephyr"]
+
+
+def test_plain_is_the_default(build, tmp_path):
+    assert files(build("plain", SPEC, "--selftest")) == {"on.h", "on.c", "on_selftest.c"}
+
+
+def test_cmake_builds_and_tests_it(build, needs):
+    needs("cmake", "cc")
+    folder = build("cmake", SPEC, "--selftest")
+    assert files(folder) == {"on.h", "on.c", "on_selftest.c", "CMakeLists.txt", "test/main.c"}
+    run(folder, "cmake", "-S", ".", "-B", "out")
+    run(folder, "cmake", "--build", "out")
+    assert "100% tests passed" in run(folder / "out", "ctest")
+
+
+def test_cmake_target_in_another_project(build, needs):
+    """Without a self-test, with the flags that the header of a long filter recommends."""
+    needs("cmake", "cc")
+    folder = build("cmake", problems.chain(8))
+    assert "-fno-schedule-insns" in (folder / "CMakeLists.txt").read_text()
+    (folder.parent / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.13)\nproject(firmware C)\nadd_subdirectory(chain8)\n"
+        "add_executable(firmware main.c)\ntarget_link_libraries(firmware PRIVATE chain8::chain8)\n"
+    )
+    (folder.parent / "main.c").write_text(
+        "#include <chain8.h>\nint main(void) { chain8_t kf; return (int)chain8_init(&kf); }\n"
+    )
+    run(folder.parent, "cmake", "-S", ".", "-B", "out")
+    run(folder.parent, "cmake", "--build", "out", "--target", "firmware")
+    run(folder.parent, "out/firmware")
+
+
+@pytest.mark.parametrize("options", [[], ["--selftest"]])
+def test_arduino_sketch_compiles_as_cplusplus(build, needs, options):
+    needs("avr-g++")
+    folder = build("arduino", SPEC, *options)
+    sketch = "examples/on_example/on_example.ino"
+    assert {"library.properties", "src/on.h", "src/on.c", sketch} <= files(folder)
+    machine = ["-mmcu=atmega328p", "-Os", "-Wall", "-Wextra", "-Werror", "-I", folder / "src", "-I", BOARDS]
+    run(folder, "avr-g++", *machine, "-include", "Arduino.h", "-x", "c++", "-c", sketch, "-o", "sketch.o")
+    for source in (folder / "src").glob("*.c"):  # and, as some make files do, the library's sources too
+        run(folder, "avr-g++", *machine, "-x", "c++", "-c", source, "-o", "cpp.o")
+        run(folder, "avr-gcc", *machine, "-std=gnu11", "-c", source, "-o", "c.o")
+
+
+def test_arduino_properties(build):
+    folder = build("arduino")
+    lines = (folder / "library.properties").read_text().splitlines()
+    properties = dict(line.split("=", 1) for line in lines)
+    # https://arduino.github.io/arduino-cli/latest/library-specification
+    assert set(properties) == {
+        "name", "version", "author", "maintainer", "sentence", "paragraph", "category", "url", "architectures",
+        "includes",
+    }  # fmt: skip
+    assert properties["name"] == "on"
+    assert properties["includes"] == "on.h"
+    assert properties["sentence"] == 'a "quoted" title # with = signs'
+    assert properties["category"] in ("Data Processing", "Other")
+
+
+def test_a_sketch_of_a_fixed_step(build, needs):
+    needs("avr-g++")
+    folder = build("arduino", problems.CV4)
+    assert "100000UL" in (folder / "examples/cv4_example/cv4_example.ino").read_text()
+    run(folder, "avr-g++", "-mmcu=atmega328p", "-Os", "-Wall", "-Wextra", "-Werror", "-I", "src", "-I", BOARDS,
+        "-include", "Arduino.h", "-x", "c++", "-c", "examples/cv4_example/cv4_example.ino", "-o", "o.o")  # fmt: skip
+
+
+# https://docs.platformio.org/en/latest/manifests/library-json: the fields that are used, and no others
+LIBRARY_JSON = {
+    "type": "object",
+    "required": ["name", "version"],
+    "additionalProperties": False,
+    "properties": {
+        "name": {"type": "string", "maxLength": 100, "pattern": "^[^:;/,@<>]+$"},
+        "version": {"type": "string", "pattern": r"^\d+\.\d+\.\d+$"},
+        "description": {"type": "string", "maxLength": 255},
+        "keywords": {"type": "string", "pattern": r"^[a-z]+(, [a-z]+)*$"},
+        "frameworks": {"const": "*"},
+        "platforms": {"const": "*"},
+        "headers": {"type": "string", "pattern": r"^\w+\.h$"},
+        "build": {
+            "type": "object",
+            "additionalProperties": False,
+            "properties": {
+                "srcDir": {"type": "string"},
+                "includeDir": {"type": "string"},
+                "flags": {"type": "array", "items": {"type": "string", "pattern": "^-"}},
+            },
+        },
+    },
+}
+
+
+def test_platformio_manifest(build):
+    folder = build("platformio", SPEC, "--selftest")
+    manifest = json.loads((folder / "library.json").read_text())
+    jsonschema.validate(manifest, LIBRARY_JSON)
+    assert manifest["name"] == "on"
+    assert files(folder) == {"library.json", "src/on.h", "src/on.c", "src/on_selftest.c"}
+    assert (folder / manifest["build"]["includeDir"] / manifest["headers"]).is_file()
+
+
+# scripts/zephyr_module.py of Zephyr: the part of its schema that is used
+MODULE_YML = {
+    "type": "object",
+    "required": ["name", "build"],
+    "additionalProperties": False,
+    "properties": {
+        "name": {"type": "string"},
+        "build": {
+            "type": "object",
+            "additionalProperties": False,
+            "properties": {"cmake": {"type": "string"}, "kconfig": {"type": "string"}},
+        },
+    },
+}
+
+
+def test_zephyr_module(build, needs):
+    needs("cmake", "cc")
+    folder = build("zephyr", SPEC, "--selftest")
+    module = YAML(typ="safe", pure=True).load((folder / "zephyr/module.yml").read_text())
+    jsonschema.validate(module, MODULE_YML)
+    assert module["name"] == "on"
+    kconfig = kconfiglib.Kconfig(folder / module["build"]["kconfig"], warn_to_stderr=False)
+    assert set(kconfig.syms) >= {"KFGEN_ON", "KFGEN_ON_SELFTEST"}
+    selftest = kconfig.syms["KFGEN_ON_SELFTEST"]
+    selftest.set_value("y")
+    assert selftest.str_value == "n"  # it depends on the filter
+    kconfig.syms["KFGEN_ON"].set_value("y")
+    assert selftest.str_value == "y"
+    # Zephyr's functions, as far as they are used
+    (folder.parent / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.13)\nproject(zephyr C)\nset(CONFIG_KFGEN_ON y)\n"
+        "set(CONFIG_KFGEN_ON_SELFTEST y)\nfunction(zephyr_include_directories)\n  include_directories(${ARGN})\n"
+        'endfunction()\nmacro(zephyr_library_named name)\n  set(library ${name})\n  file(WRITE none.c "")\n'
+        "  add_library(${name} STATIC none.c)\nendmacro()\nmacro(zephyr_library_sources)\n"
+        "  target_sources(${library} PRIVATE ${ARGN})\nendmacro()\nmacro(zephyr_library_sources_ifdef feature)\n"
+        "  if(${${feature}})\n    target_sources(${library} PRIVATE ${ARGN})\n  endif()\nendmacro()\n"
+        "macro(zephyr_library_compile_options)\n  target_compile_options(${library} PRIVATE ${ARGN})\nendmacro()\n"
+        "include_directories(on)\nadd_subdirectory(on)\n"
+    )
+    run(folder.parent, "cmake", "-S", ".", "-B", "out")
+    run(folder.parent, "cmake", "--build", "out")
+    symbols = run(folder.parent, "nm", "out/on/libon.a")
+    assert "on_predict" in symbols
+    assert "on_selftest" in symbols
