@@ -290,7 +290,7 @@ class _ViewMaker:
         returns = () if void else (f"@return {self.outcome(f)}",)
         cost = self.cost(f) if self.counted(f) else ""
         return FunctionView(
-            doc=f.doc,
+            doc="\n   ".join(_fill(f.doc, WIDTH - 6)) if f.private else f.doc,
             parameters=tuple(parameters),
             returns=returns,
             costs=tuple(_fill(cost + ".", WIDTH - 6)) if cost else (),
