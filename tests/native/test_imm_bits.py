@@ -73,7 +73,7 @@ ULPS = 16  # that exp, log and what follows from them may be apart
 
 def follow(twin: Twin) -> Status:
     random, seen = np.random.default_rng(3), Status.OK
-    for k in range(24):
+    for k in range(16):
         z = random.normal(size=2) * (1 if k % 4 else 6) + [2, 1]
         z[0] = np.nan if k == 9 else z[0]
         todo = [
@@ -84,7 +84,7 @@ def follow(twin: Twin) -> Status:
             todo.append(("update_course", {"z": random.normal(size=1)}))
         A = random.normal(size=(3, 3))
         if k % 8 == 6:
-            todo.append(("set_covariance", {"P": A @ A.T if k < 12 else A + A.T}))
+            todo.append(("set_covariance", {"P": A @ A.T if k < 10 else A + A.T}))
             todo.append(("set_state", {"x": A[0]}))
         if "redraw" in twin.functions and k % 5 == 0:
             todo.insert(1, ("redraw", {}))

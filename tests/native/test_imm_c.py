@@ -118,7 +118,7 @@ def mixture(key: str) -> str:
 def test_mixtures():
     seen = Status.OK
     for key, pair in pairs({key: mixture(key) for key in MIXTURES}).items():
-        pair.drive(30, 3)
+        pair.drive(20, 3)
         assert pair.worst < 1e-8, key
         seen |= pair.seen
     every = Status.GATED | Status.ANOMALY | Status.DT_CLAMPED | Status.NOT_FINITE | Status.NOT_POSITIVE
@@ -305,7 +305,8 @@ def test_chains_with_zeros():
         "rare": many(1, [[1, "1e-60"], ["1e-60", 1]], mu_floor="1e-60"),
     }
     for scalar in ("double", "float"):
-        for key, pair in pairs(chains, scalar).items():
+        few = chains if scalar == "double" else {key: chains[key] for key in ("end", "rare")}
+        for key, pair in pairs(few, scalar).items():
             if scalar == "double" or key != "rare":
                 pair.drive(12, 2)
                 assert pair.worst < (1e-8 if scalar == "double" else 1e-2), key
