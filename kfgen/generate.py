@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from kfgen.emit.render import render
 from kfgen.emit.view import View, make_view
@@ -17,11 +18,12 @@ from kfgen.spec.types import Spec
 
 @dataclass(frozen=True)
 class Summary:
-    """What the build table shows: operations per function, RAM in bytes, remarks."""
+    """What the build table shows: operations per function, RAM in bytes, remarks; loops or unrolled, where chosen."""
 
     rows: list[tuple[str, dict[str, int]]]
     ram: int
     notes: list[str]
+    forms: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def build(spec: Spec, scalar: str | None = None, *, judge: bool = True) -> Gener
         order = "" if mode.order == code.order else f"; inner order: {inner}"
         notes.append(f"{mode.name}: {mode.description}{order}")
     notes += code.remarks
-    return Generated(render(view), Summary(rows, view.ram, notes), code, view)
+    return Generated(render(view), Summary(rows, view.ram, notes, code.forms), code, view)
 
 
 def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:

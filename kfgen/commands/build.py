@@ -191,7 +191,11 @@ def table(built: Sequence[Built]) -> str:
     notes: list[str] = []
     for each in built:
         sizes, summary = _sizes(each.spec), each.generated.summary
-        functions = [(name, _operations(counts)) for name, counts in summary.rows]
+        forms = summary.forms
+        functions = [
+            (_with_form(name, forms), _operations(counts) if counts or name not in forms else "")
+            for name, counts in summary.rows
+        ]
         files = [str(path) for path in each.files]
         for i in range(max(len(sizes), len(functions), len(files))):
             function, operations = functions[i] if i < len(functions) else ("", "")
@@ -217,6 +221,11 @@ def _sizes(spec: Spec) -> list[str]:
     if spec.inputs:
         sizes.append(plural(len(spec.inputs), "input"))
     return [*sizes, *(f"{sensor.name}: {len(sensor.components)}" for sensor in spec.measurements)]
+
+
+def _with_form(name: str, forms: Mapping[str, str]) -> str:
+    """A function, and what was chosen for it."""
+    return f"{name}: {forms[name]}" if name in forms else name
 
 
 def _operations(counts: Mapping[str, int]) -> str:

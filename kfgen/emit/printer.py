@@ -187,7 +187,7 @@ class Printer:
         real = self.scalar.c_type
         match statement:
             case Section(text=text):
-                return _comment(text, depth)
+                return comment(text, depth)
             case Let(node=node, name=name):
                 kind = {"real": real, "bool": "bool", "int": "int"}[node.kind]
                 return _wrapped(f"const {kind} {name} = {e(node)};", depth)
@@ -225,7 +225,7 @@ class Printer:
                 if down:
                     opening = f"for (int {v} = {e(stop, _SUM)} - 1; {v} >= {e(start)}; {v}--) {{"
                 else:
-                    opening = f"for (int {v} = {e(start)}; {v} < {e(stop)}; {v}++) {{"
+                    opening = f"for (int {v} = {e(start)}; {v} < {e(stop, _SUM)}; {v}++) {{"
                 return _wrapped(opening, depth) + self.statements(inner, depth + 1) + ["    " * depth + "}"]
             case If(condition=condition, body=inner):
                 opening = f"if ({e(condition)}) {{"
@@ -236,7 +236,8 @@ def _assignment(target: str, value: str) -> str:
     return f"{target} = {value};"
 
 
-def _comment(text: str, depth: int) -> list[str]:
+def comment(text: str, depth: int = 0) -> list[str]:
+    """A comment in lines of at most WIDTH columns."""
     words = text.split()
     indent = "    " * depth
     lines = [indent + "/*"]

@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 import sympy
 
 from kfgen.emit import struct
-from kfgen.emit.printer import WIDTH, Printer
+from kfgen.emit.printer import WIDTH, Printer, comment
 from kfgen.filters.base import FilterCode
 from kfgen.ir.count import operations
 from kfgen.ir.nodes import Constants, Table
@@ -34,6 +34,11 @@ STATUSES = (
     ("NOT_FINITE", 0x200, "an argument or a value of the model is NaN or infinite"),
     ("NOT_POSITIVE", 0x400, "a variance or dt is not positive"),
 )
+
+_TABLES = {
+    "order": "inner position -> index into x",
+    "reach": "pair of columns of F U -> how many of its leading entries may differ from zero",
+}
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,7 @@ class Data:
 @dataclass(frozen=True)
 class FunctionView:
     doc: str
+    comment: tuple[str, ...]  # the doc of a private function
     parameters: tuple[str, ...]
     returns: tuple[str, ...]
     costs: tuple[str, ...]
@@ -194,7 +200,7 @@ class _ViewMaker:
             ),
             functions=functions,
             constants=tuple(
-                Data(name=f"{self.name}_{key}", reader=f"{self.NAME}_{key}", comment="inner position -> index into x",
+                Data(name=f"{self.name}_{key}", reader=f"{self.NAME}_{key}", comment=_TABLES.get(key, _TABLES["order"]),
                      size=len(values), values="{ " + ", ".join(map(str, values)) + " }")
                 for key, values in code.constants.items()
             ),
@@ -290,7 +296,8 @@ class _ViewMaker:
         returns = () if void else (f"@return {self.outcome(f)}",)
         cost = self.cost(f) if self.counted(f) else ""
         return FunctionView(
-            doc="\n   ".join(_fill(f.doc, WIDTH - 6)) if f.private else f.doc,
+            doc=f.doc,
+            comment=tuple(comment(f.doc)),
             parameters=tuple(parameters),
             returns=returns,
             costs=tuple(_fill(cost + ".", WIDTH - 6)) if cost else (),

@@ -158,7 +158,7 @@ class AdaptedQ:
         n = self.kept.k
         nothing = added is None or all(is_zero(q) for row in added for q in row)
         if nothing and self.kept.factored:
-            return Factored(*self.kept.factors(t))
+            return Factored(*self.kept.factors(t), f"kf.{self.kept.field}")
         entries = self.kept.entries(t)
         total = [[entries[i, j] for j in range(n)] for i in range(n)]
         if added is not None:

@@ -13,13 +13,17 @@ from kfgen.model import Model
 
 @dataclass(frozen=True)
 class Block:
-    """A field of the filter's struct: `size` numbers (None: a single one)."""
+    """A field of the filter's struct: `size` numbers (None: a single one).
+
+    compact: what is initially the same nearly everywhere is set everywhere first.
+    """
 
     name: str
     size: int | None
     doc: str
     kind: str = "real"  # real | uint32 | bool
     initial: tuple[Fraction, ...] = ()
+    compact: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,7 @@ class FilterCode:
     lookups: Mapping[Constants, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()  # for the build's table
     modes: tuple[ModeNote, ...] = ()  # of a bank
+    forms: Mapping[str, str] = field(default_factory=dict)  # function -> loops or unrolled, where that was chosen
 
 
 KF = Argument("kf", "{name}_t", pointer=True, constant=False, doc="filter")

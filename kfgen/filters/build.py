@@ -11,14 +11,18 @@ import sympy
 from kfgen.errors import Mistake, SpecError
 from kfgen.filters import process
 from kfgen.filters.base import FilterCode
+from kfgen.filters.choice import choose, told, with_privates
 from kfgen.filters.ekf import Ekf
 from kfgen.filters.full import Full
 from kfgen.filters.imm import Imm
 from kfgen.filters.iterated import Iekf
 from kfgen.filters.layout import GainChange, Layout
-from kfgen.filters.linalg import Vector
-from kfgen.filters.numbers import is_zero, select
+from kfgen.filters.looped import Kernels
+from kfgen.filters.numbers import is_zero
 from kfgen.filters.order import best_order
+from kfgen.filters.rolled_full import RolledFull
+from kfgen.filters.rolled_sqrt import RolledSqrt
+from kfgen.filters.rolled_ud import RolledUD
 from kfgen.filters.second import Ekf2
 from kfgen.filters.sensor import SensorCode
 from kfgen.filters.shared import unused
@@ -55,7 +59,40 @@ def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCod
     _check_measurements(model)
     if spec.filter.gain is not None:
         return _with_tables(Steady(model, scalar).code(taken))
-    return _with_tables(_single(model, scalar).code(taken))
+    return _with_tables(with_privates(_unrolled_or_not(model, scalar, taken)))
+
+
+def _unrolled_or_not(model: Model, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
+    """The filter in straight-line code or in loops, as `code` asks."""
+    chosen = model.spec.code
+    layout = _layout(model, scalar)
+
+    def emitted(layout: Layout) -> FilterCode:
+        return _FILTERS[model.spec.filter.type](model, layout, scalar).code(taken)
+
+    if chosen.unroll == "full" or (chosen.unroll == "auto" and chosen.flash is None):
+        return emitted(layout)
+    looped = emitted(_rolled(model, layout, scalar, taken))
+    if chosen.flash is None:
+        return told(looped, lambda name: True)
+    return choose(emitted(layout) if chosen.unroll == "auto" else looped, looped, chosen.flash)
+
+
+def _rolled(model: Model, layout: Layout, scalar: Scalar, taken: frozenset[str]) -> Layout:
+    """The same layout in loops; where there is nothing to loop over, as it is."""
+    if layout.n == 1 or model.spec.filter.type == "ukf":
+        return layout
+    names = [model.states[i] for i in layout.order]
+    kernels = Kernels(scalar.smallest, taken)
+    steps = model.options.adapt_Q is not None
+    weighted = model.options.influence is not None
+    if isinstance(layout, UD):
+        return RolledUD(layout.order, layout.form, layout.change, names, kernels, weighted, steps, model.spec.name)
+    if isinstance(layout, Sqrt):
+        return RolledSqrt(layout.n, names, kernels, weighted, steps, model.spec.name)
+    if isinstance(layout, Full):
+        return RolledFull(layout, names, kernels)
+    return layout
 
 
 def _single(model: Model, scalar: Scalar, order: list[int] | None = None) -> Ekf:
@@ -92,14 +129,8 @@ def _gain_change(model: Model, order: list[int]) -> GainChange | None:
     if options.gain_limit is None and not options.consider:
         return None
 
-    def change(K: Vector) -> Vector:
-        K = [0 if i in options.consider else k for i, k in zip(order, K, strict=True)]
-        limit = options.gain_limit
-        if limit is None:
-            return K
-        return [k if is_zero(k) else select(k > limit, limit, select(k < -limit, -limit, k)) for k in K]
-
-    return change
+    considered = frozenset(place for place, i in enumerate(order) if i in options.consider)
+    return GainChange(considered, options.gain_limit)
 
 
 def _check_measurements(model: Model) -> None:

@@ -39,9 +39,10 @@ class CovarianceCode:
         return [self.set_covariance(taken), self.get_covariance(taken), *self.layout.functions(taken, self.outdated)]
 
     def constants(self) -> dict[str, tuple[int, ...]]:
-        """The inner order, where a table is needed for it."""
+        """The inner order, where a table is needed for it, and what the layout looks up."""
         straight = list(range(self.n))
-        return {} if self.order in (straight, straight[::-1]) else {self.table: tuple(self.order)}
+        order = {} if self.order in (straight, straight[::-1]) else {self.table: tuple(self.order)}
+        return {**order, **self.layout.tables}
 
     def place(self, t: Trace) -> Callable[[Value], Value]:
         """From an inner position to the state of the spec."""

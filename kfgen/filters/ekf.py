@@ -18,10 +18,12 @@ from kfgen.filters.gate import gate, store_outcome
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Rows, Vector, plus
 from kfgen.filters.linalg import dot as inner_product
+from kfgen.filters.looped import Displacement, kept_in_array
 from kfgen.filters.noise import Additive, Given
 from kfgen.filters.numbers import is_positive, require_nonnegative
 from kfgen.filters.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.process import Advance, Prior, Step
+from kfgen.filters.runs import put
 from kfgen.filters.sensor import Innovation, Linearised, SensorCode, decorrelated, masked, total
 from kfgen.filters.sequence import Sequence, Updated, departs
 from kfgen.filters.state import StateCode
@@ -192,8 +194,11 @@ class Ekf:
         for row_name, row in zip(self.names, F, strict=True):
             for name, value in zip(self.names, row, strict=True):
                 t.name(value, f"f_{row_name}_{name}")
-        P = self.layout.predict(t, self.layout.load(t), F, self.additive(t, result), noise)
         x = [t.name(value, f"{name}_next") for value, name in zip(result.x, model.states, strict=True)]
+        P0 = self.layout.load(t)
+        if self.layout.rolled:
+            x = kept_in_array(t, x, prior.x)
+        P = self.layout.predict(t, P0, F, self.additive(t, result), noise)
         evidence = self.unconfined(x) + self.layout.evidence(P, after_predict=True)
         P = self.limited(t, P)
         x = self.state.confined(t, x)
@@ -358,6 +363,8 @@ class Ekf:
     def moved(self, u: Update, moved: Vector) -> list[Value]:
         """x after the update, in the spec's order, before bounds and wrapping."""
         t = u.t
+        if isinstance(moved, Displacement):
+            return moved.state(self.covariance.place(t))
         x = [t.zero] * len(moved)
         for place, m in zip(self.order, moved, strict=True):
             x[place] = t.name(t.value(plus(u.x[place], m)), f"{self.model.states[place]}_next")
@@ -378,6 +385,5 @@ class Ekf:
 
     def store(self, t: Trace, x: list[Value], moved: set[int], P: Covariance, after_predict: bool) -> None:
         t.section("store")
-        for i in sorted(moved):
-            t.store("kf.x", i, x[i])
+        put(t, lambda i, value: t.store("kf.x", i, value), {i: x[i] for i in sorted(moved)}, local=True)
         self.layout.store(t, P, self.names, after_predict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 
 from kfgen.filters import linalg
@@ -27,6 +28,8 @@ class Full:
 
     title = "full"
     reorders = False
+    rolled = False
+    tables: Mapping[str, tuple[int, ...]] = {}
     factored = False
     group = 1
 

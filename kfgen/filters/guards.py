@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import reduce
 from operator import or_
 
+from kfgen.filters.runs import summed
 from kfgen.ir.trace import Trace, Value
 
 
@@ -17,6 +18,7 @@ def inputs(t: Trace, names: tuple[str, ...]) -> None:
 def finite(t: Trace, values: list[Value]) -> None:
     """NOT_FINITE by one test for all: a sum is finite only if its terms are."""
     live = list({v.node: v for v in map(t.value, values) if v.constant is None}.values())
+    live = summed(t, live)
     if live:
         t.guard(~t.finite(sum(live[1:], live[0])), "NOT_FINITE")
 

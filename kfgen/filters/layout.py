@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Protocol
 
 from kfgen.filters.base import Block
 from kfgen.filters.linalg import Measurement, Rows, Vector
 from kfgen.filters.noise import Additive
-from kfgen.filters.numbers import Number
+from kfgen.filters.numbers import Number, is_zero, select
 from kfgen.filters.symmetric import Symmetric
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 
 Covariance = Any  # the layout's own: factors, entries, ...
-GainChange = Callable[[Vector], Vector]  # what consider and gain_limit make of a gain
+
+
+@dataclass(frozen=True)
+class GainChange:
+    """What `consider` and `gain_limit` make of a gain. considered: inner positions."""
+
+    considered: frozenset[int]
+    limit: Fraction | None
+
+    def __call__(self, K: Vector) -> Vector:
+        K = [0 if i in self.considered else k for i, k in enumerate(K)]
+        limit = self.limit
+        if limit is None:
+            return K
+        return [k if is_zero(k) else select(k > limit, limit, select(k < -limit, -limit, k)) for k in K]
 
 
 class Layout(Protocol):
@@ -25,9 +40,15 @@ class Layout(Protocol):
     title: str  # "U D U^T"
     order: list[int]  # inner position -> state of the spec
     reorders: bool  # whether that order is the generator's choice, for the header to tell
+    rolled: bool  # whether it is emitted as loops over arrays
     change: GainChange | None  # joseph only: the other forms need the gain that they make
     factored: bool  # whether an adapted Q or R is kept as its factors
     group: int  # scalar measurements that are best updated together
+
+    @property
+    def tables(self) -> Mapping[str, tuple[int, ...]]:
+        """Of indices, that its loops look up; known when the functions have been traced."""
+        ...
 
     def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
         """The fields of the struct that hold it, with the values of P0 (n, n)."""

@@ -60,9 +60,10 @@ class Computed:
 
 
 class Factored:
-    """A Q that is kept as its factors."""
+    """A Q that is kept as its factors. field: where, U above D, upper triangle by columns."""
 
-    def __init__(self, U: Rows, D: Vector) -> None:
+    def __init__(self, U: Rows, D: Vector, field: str = "") -> None:
+        self.field = field
         self.U = U
         self.D = D
 

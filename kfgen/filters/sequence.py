@@ -7,7 +7,7 @@ whole vector. Robust and adaptive updates, floors of the innovation variance and
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -15,6 +15,7 @@ from kfgen.filters import linalg
 from kfgen.filters.influence import weigh
 from kfgen.filters.layout import Covariance, Layout
 from kfgen.filters.linalg import Measurement, Vector
+from kfgen.filters.looped import Displacement, displaced
 from kfgen.filters.numbers import assume_positive, is_positive, is_zero, reciprocal, select
 from kfgen.filters.sensor import Innovation
 from kfgen.ir.trace import Trace, Value
@@ -77,7 +78,7 @@ class Sequence:
         """All components in order; P stays as it is."""
         t, layout = self.t, self.layout
         rows, variances, y = innovation.rows, innovation.variances, innovation.y
-        moved: list[Any] = [0] * layout.n
+        moved: Vector = [0] * layout.n
         nis: Any = 0
         likelihood: Any = 0  # -2 log
         every_s: list[Value] = []
@@ -102,18 +103,26 @@ class Sequence:
                 P, nu, measurement, failed = self._prepared(P, first, nu, measurements[0], used, below[0])
                 measurements = [measurement]
                 failures += failed
+            elif layout.rolled:
+                nu = self._corrected(y, rows, moved, first)
+            if layout.rolled:
+                measurements = [replace(measurements[0], nu=nu, moved=moved)]
             P, gains, s = layout.update(t, P, measurements)
             for c, K, variance, low in zip(part, gains, s, below, strict=True):
                 t.name(variance, f"s_{self.names[c]}")
-                if not singly:
+                if not (singly or layout.rolled):
                     nu = self._corrected(y, rows, moved, c)
                 step = [linalg.times(k, nu) for k in K]
                 steps.append(step)
-                moved = [linalg.plus(m, d) for m, d in zip(moved, step, strict=True)]
-                square = nu * (nu * (1 / variance))  # the gain has made the reciprocal
+                moved = displaced(moved, K, nu)
+                square = K.square if isinstance(K, Displacement) else None
+                if square is None:
+                    square = nu * (nu * (1 / variance))  # the gain has made the reciprocal
                 sure = is_positive(variances[c]) or self.floor is not None
-                if sure:
+                if sure and not (layout.rolled and layout.factored):  # there it is r and squares
                     failures.append(~(variance > 0))
+                elif sure:
+                    pass
                 else:  # a direction already known, measured exactly: skipped
                     square = t.select(variance > 0, square, 0)
                     failures.append(variance < -low)

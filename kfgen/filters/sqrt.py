@@ -5,6 +5,7 @@ Inside, the states are in reverse order: S is then upper triangular, and the ker
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 
 from kfgen.filters import linalg
@@ -37,6 +38,8 @@ class Sqrt:
 
     title = "lower triangular square root"
     reorders = False
+    rolled = False
+    tables: Mapping[str, tuple[int, ...]] = {}
     change: GainChange | None = None
     factored = True
     group = 1

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from kfgen.filters.base import KF, Block
 from kfgen.filters.numbers import select
+from kfgen.filters.runs import put
 from kfgen.ir.program import Argument, Function, Store
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace, Value
@@ -157,6 +158,9 @@ class StateCode:
 def _store_runs(t: Trace, block: Block) -> None:
     """Constants of an array: equal neighbours in a loop, the others one by one."""
     values = block.initial
+    if block.compact:
+        put(t, lambda i, value: t.store(f"kf.{block.name}", i, value), [t.value(v) for v in values])
+        return
     start = 0
     while start < len(values):
         stop = start

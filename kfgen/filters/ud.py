@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 
 from kfgen.filters import linalg
@@ -26,6 +27,8 @@ class UD:
 
     title = "U D U^T"
     reorders = True
+    rolled = False
+    tables: Mapping[str, tuple[int, ...]] = {}
     factored = True
 
     def __init__(self, order: list[int], update: str, change: GainChange | None = None) -> None:

@@ -21,7 +21,7 @@ def unbuilt(spec: Spec) -> list[Mistake]:
         refuse(spec.places.get("scalar", spec.place), f"scalar: {spec.scalar}", "use float or double")
     code = spec.code
     for key, wanted in {
-        "unroll": code.unroll == "none", "flash": code.flash, "ram": code.ram, "stack": code.stack,
+        "ram": code.ram, "stack": code.stack,
     }.items():  # fmt: skip
         if wanted:
             refuse(code.places.get(key, spec.place), f"code.{key}", "leave it out")

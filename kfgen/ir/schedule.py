@@ -60,6 +60,7 @@ class _Scheduler:
     def run(self) -> list[Statement]:
         for block in (self.trace.block, *self.trace.blocks.values()):
             self.taken |= {item.name for item in block.items if isinstance(item, Declare)}
+            self.taken |= {item.variable for item in block.items if isinstance(item, For)}
         self._count(self.trace.block)
         return self._block(self.trace.block)
 
@@ -233,9 +234,57 @@ class _Scheduler:
                     self._local(node)
                     when = made
                 stack.extend((a, when) for a in node.args if a.volatile)
+            if isinstance(item, For | If):
+                forced |= self._overtaken(item, position)
             if isinstance(item, Assign | Call | For | If):
                 epoch += 1
         return forced
+
+    def _overtaken(self, item: For | If, position: dict[Node, int]) -> set[Node]:
+        """Values made before a body that are evaluated in it, and read what it writes."""
+        used, written = self._inside(item)
+        reads: dict[Node, bool] = {}
+
+        def overtaken(node: Node) -> bool:
+            if node not in reads:
+                own = node.op == "read" and node.data in written
+                inlined = node.volatile and not self._shared(node)
+                reads[node] = inlined and (own or any(overtaken(a) for a in node.args))
+            return reads[node]
+
+        out: set[Node] = set()
+        met: set[Node] = set()
+        while used:
+            node = used.pop()
+            if node in met or not overtaken(node):
+                continue
+            met.add(node)
+            if node in position:
+                if node.kind != "int":
+                    out.add(node)
+                    self._local(node)
+                continue
+            used += node.args
+        return out
+
+    def _inside(self, item: For | If) -> tuple[list[Node], set[str]]:
+        """The nodes that the statements of a body evaluate, and the locals that they write, at any depth."""
+        used: list[Node] = []
+        written: set[str] = set()
+        for inner in self.trace.blocks[id(item)].items:
+            if isinstance(inner, Node):
+                continue
+            used += roots(inner)
+            if isinstance(inner, Assign):
+                written.add(inner.name)
+            elif isinstance(inner, Call):
+                written |= {given.array for a, given in zip(inner.callee.arguments, inner.args, strict=True)
+                            if isinstance(given, Slice) and not a.constant}  # fmt: skip
+            elif isinstance(inner, For | If):
+                nodes, names = self._inside(inner)
+                used += nodes
+                written |= names
+        return used, written
 
     def _statement(self, item: Statement) -> Statement:
         op = self._operand

@@ -6,6 +6,7 @@ fold as it runs, so the algorithm is written in full and what is emitted is what
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -121,6 +122,7 @@ class Trace:
         self.depth = 0  # of loops and branches
         self.names: dict[Node, str] = {}
         self.doubts: list[tuple[Value, str]] = []  # conditions under which an assumption made fails, and why
+        self.declared: Counter[str] = Counter()
         self.signs: dict[Node, int] = {}  # what is known of the sign of values (see filters.numbers)
 
         self.zero = self.wrapped(self.pool.zero)
@@ -213,6 +215,11 @@ class Trace:
         """A local array, not initialised."""
         self.block.items.append(Declare(name, size))
         return Array(self, name)
+
+    def unique(self, base: str) -> str:
+        """A name for a local array or variable that no other one asked for here has."""
+        self.declared[base] += 1
+        return base if self.declared[base] == 1 else f"{base}_{self.declared[base]}"
 
     def variable(self, name: str, value: Value | Number) -> Variable:
         """A local that may be assigned again, as loops need."""

@@ -27,6 +27,7 @@ class Summary:
     )
     ram: int = 48
     notes: list[str] = field(default_factory=lambda: ["states are kept in the order px, py, th"])
+    forms: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass

@@ -1,0 +1,95 @@
+"""Which functions of a filter are emitted as loops: `unroll`, within `flash`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from kfgen.errors import SpecError
+from kfgen.filters.base import FilterCode
+from kfgen.ir.program import Call, Function, walk
+from kfgen.ir.size import predicted_flash
+
+MARGIN = 1.25  # what a prediction may be wrong by: within it a choice still fits
+LOOPS, STRAIGHT = "loops", "unrolled"
+
+# Measured with gcc 12 on a Cortex-M4F: small functions that stay functions are smaller and no slower.
+LOOPING = (
+    "Recommended with gcc, for these loops in small functions:",
+    "  -O2 -fno-inline -fno-tree-pre -fno-reorder-blocks",
+)
+
+
+def choose(straight: FilterCode, looped: FilterCode, budget: int) -> FilterCode:
+    """The functions of two forms of a filter, loops where straight-line code would exceed the budget in bytes.
+
+    Those that save most become loops first; none does that saves nothing. Raises SpecError where even the smallest
+    choice is predicted to exceed the budget.
+    """
+    names = [f.name for f in straight.functions if _counted(f)]
+    rolled: set[str] = set()
+    while _flash(_mixed(straight, looped, rolled)) * MARGIN > budget:
+        found = _flash(_mixed(straight, looped, rolled))
+        sizes = {name: _flash(_mixed(straight, looped, rolled | {name})) for name in names if name not in rolled}
+        smaller = {name: size for name, size in sizes.items() if size < found}
+        if not smaller:  # perhaps all together, which share private functions
+            everything = set(names)
+            if rolled != everything and _flash(_mixed(straight, looped, everything)) < found:
+                rolled = everything
+            break
+        rolled.add(min(smaller, key=lambda name: smaller[name]))
+    code = _mixed(straight, looped, rolled)
+    total = _flash(code)
+    if total > budget:
+        spec = straight.model.spec
+        parts = ", ".join(f"{f.name} {predicted_flash(f)}" for f in with_privates(code).functions)
+        raise SpecError.at(
+            spec.code.places.get("flash", spec.place),
+            f"{total} bytes of flash are predicted, {total - budget} more than the budget ({parts})",
+            "raise the budget, or choose a smaller filter",
+        )
+    return code
+
+
+def told(code: FilterCode, rolled: Callable[[str], bool]) -> FilterCode:
+    """With what was chosen for each function, for the build's table, and the compiler's flags for it."""
+    forms = {f.name: LOOPS if rolled(f.name) else STRAIGHT for f in code.functions if _counted(f)}
+    notes = LOOPING if set(forms.values()) == {LOOPS} else code.notes
+    return replace(code, forms=forms, notes=notes)
+
+
+def with_privates(code: FilterCode) -> FilterCode:
+    """With the private functions that are called and not among the functions, each before the first that calls it."""
+    out: list[Function] = []
+
+    def add(function: Function) -> None:
+        for callee in _callees(function):
+            add(callee)
+        if all(function is not known for known in out):
+            out.append(function)
+
+    for function in code.functions:
+        add(function)
+    return replace(code, functions=tuple(out))
+
+
+def _mixed(straight: FilterCode, looped: FilterCode, rolled: set[str]) -> FilterCode:
+    """Functions by name from either."""
+    other = {f.name: f for f in looped.functions}
+    functions = tuple(other[f.name] if f.name in rolled else f for f in straight.functions if not f.private)
+    constants = {**straight.constants, **looped.constants} if rolled else straight.constants
+    return told(replace(straight, functions=functions, constants=constants), rolled.__contains__)
+
+
+def _flash(code: FilterCode) -> int:
+    return sum(predicted_flash(f) for f in with_privates(code).functions)
+
+
+def _callees(function: Function) -> Iterator[Function]:
+    for statement in walk(function.body):
+        if isinstance(statement, Call):
+            yield statement.callee
+
+
+def _counted(function: Function) -> bool:
+    return function.name == "predict" or function.name.startswith("update_")

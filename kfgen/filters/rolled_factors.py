@@ -1,0 +1,122 @@
+"""The prediction of factors in loops: rank-one updates, two columns after another, from the factors of Q on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from kfgen.filters import linalg
+from kfgen.filters.kernels import absorb
+from kfgen.filters.linalg import Rows, Vector
+from kfgen.filters.looped import Kernels, Space, fill, integer
+from kfgen.filters.noise import NEGATIVE, Additive, Factored
+from kfgen.filters.numbers import assume_nonnegative, is_one, is_positive, is_zero, require_nonnegative
+from kfgen.filters.runs import Put, put
+from kfgen.filters.ud import column, packed, triangle
+from kfgen.ir.trace import Array, Trace, Value
+
+
+class Absorber:
+    """U and D in the local arrays `factor` (strict upper triangle by columns) and `diagonal`, and what they absorb.
+
+    names: of the states in the inner order. prefix: the filter's name. tables: see Layout.
+    """
+
+    def __init__(self, names: list[str], kernels: Kernels, prefix: str) -> None:
+        self.n = len(names)
+        self.names = names
+        self.kernels = kernels
+        self.prefix = prefix
+        self.tables: dict[str, tuple[int, ...]] = {}
+
+    def arrays(self, space: Space) -> tuple[Array, Array]:
+        return space.array("factor", self.n * (self.n - 1) // 2), space.array("diagonal", self.n)
+
+    def run(
+        self, space: Space, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]], title: str,
+        column_of: Callable[[Value, Put], None], weight: Callable[[int | Value], Value],
+    ) -> None:  # fmt: skip
+        """The arrays become the factors of Q + sum of d w w^T + sum of weight_k (F c_k)(F c_k)^T.
+
+        column_of(k, entry): gives the entries 0 to k of c_k, those after are zero. c_0 is the first unit vector.
+        """
+        n, t = self.n, space.t
+        t.section("Q")
+        sure = self._start(t, space, Q)
+        w = self.columns(space)
+        for _, d in noise:
+            require_nonnegative(d, NEGATIVE)
+        if noise:
+            t.section("process noise")
+        for c in range(0, len(noise), 2):
+            self._absorb_columns(space, sure, noise[c : c + 2])
+        t.section(title)
+        if n % 2:
+            self._absorb_columns(space, sure, [([row[0] for row in F], assume_nonnegative(weight(0)))])
+        with t.loop("pair", 0, n // 2) as pair:
+            k = 2 * pair + n % 2
+            with t.loop("side", 0, 2) as side:
+                start = side * n
+                column_of(k + side, lambda i, value: w.__setitem__(start + i, value))
+                self._transition(t, F, w, start)
+            weights = [assume_nonnegative(weight(place)) for place in (k, k + 1)]
+            self.absorb(space, sure, weights, self._reach(t, F, pair))
+
+    def columns(self, space: Space) -> Array:
+        """Two columns to be absorbed, at zero; so they are afterwards."""
+        new = "w" not in space.arrays
+        w = space.array("w", 2 * self.n)
+        if new:
+            with space.t.loop("i", 0, 2 * self.n) as i:
+                w[i] = 0
+        return w
+
+    def absorb(self, space: Space, sure: bool, weights: list[Value], count: Value) -> None:
+        """The two columns, of which `count` leading entries may differ from zero. sure: D is known to be positive."""
+        U, D = self.arrays(space)
+        space.t.call(absorb(self.kernels, self.n, sure), [(U.name, 0), (D.name, 0), ("w", 0), *weights, count])
+
+    def _absorb_columns(self, space: Space, sure: bool, columns: list[tuple[Vector, Value]]) -> None:
+        """One or two columns (vector, weight), of which the entries are known one by one."""
+        t, n = space.t, self.n
+        none: tuple[Vector, Value] = ([t.zero] * n, t.zero)
+        (a, weight_a), (b, weight_b) = [*columns, none][:2]
+        last = max((i for i in range(n) if not is_zero(a[i]) or not is_zero(b[i])), default=-1)
+        put(t, self.columns(space).__setitem__, {i: x for i, x in enumerate([*a, *b]) if not is_zero(x)})
+        self.absorb(space, sure, [weight_a, weight_b], integer(t, last + 1))
+
+    def _start(self, t: Trace, space: Space, Q: Additive) -> bool:
+        """The arrays hold the factors of Q; whether all of D is known to be positive."""
+        n = self.n
+        U, D = self.arrays(space)
+        UQ, DQ = Q.factors()
+        if isinstance(Q, Factored) and Q.field:
+            with t.loop("j", 0, n) as at:
+                with t.loop("i", 0, at) as above:
+                    U[triangle(at) + above] = t.element(Q.field, column(at) + above)
+                D[at] = t.element(Q.field, column(at) + at)
+        else:
+            flat = {packed(row, col): t.value(UQ[row][col]) for col in range(n) for row in range(col)}
+            if any(is_zero(u) for u in flat.values()):
+                with t.loop("i", 0, len(flat)) as i:
+                    U[i] = 0
+                flat = {place: u for place, u in flat.items() if not is_zero(u)}
+            put(t, U.__setitem__, flat)
+            fill(t, D, DQ)
+        return all(is_positive(d) for d in DQ)
+
+    def _transition(self, t: Trace, F: Rows, w: Array, start: Value) -> None:
+        """w <- F w by unrolled products, w from `start` on; rows of the identity leave their entry."""
+        old: Vector = [t.name(w[start + i], f"w_{name}") for i, name in enumerate(self.names)]
+        for i, row in enumerate(F):
+            if not (is_one(row[i]) and all(is_zero(x) for k, x in enumerate(row) if k != i)):
+                w[start + i] = t.value(linalg.dot(row, old))
+
+    def _reach(self, t: Trace, F: Rows, pair: Value) -> Value:
+        """How many leading entries of a pair of columns may differ from zero once F has been applied."""
+        n = self.n
+        last = [max((i for i in range(n) if not is_zero(F[i][j])), default=0) for j in range(n)]
+        counts = [1 + max(last[: j + 1]) for j in range(1 + n % 2, n, 2)]
+        if counts == [n] * len(counts):
+            return integer(t, n)
+        self.tables = {"reach": tuple(counts)}
+        return t.wrapped(t.pool.make("element", (pair.node,), f"{self.prefix}_reach", "int"))
