@@ -16,7 +16,9 @@
 #endif
 
 /* inner position -> index into x */
-static const uint8_t cv2d_order[4] CV2D_flash = { 0, 2, 1, 3 };
+static const uint8_t cv2d_order[4] CV2D_flash = {
+    0, 2, 1, 3
+};
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool cv2d_finite(float a)

@@ -18,7 +18,9 @@
 #endif
 
 /* inner position -> index into x */
-static const uint8_t gps_order[5] GPS_flash = { 4, 3, 0, 1, 2 };
+static const uint8_t gps_order[5] GPS_flash = {
+    4, 3, 0, 1, 2
+};
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool gps_finite(double a)

@@ -18,7 +18,9 @@
 #endif
 
 /* inner position -> index into x */
-static const uint8_t tracker_order[4] TRACKER_flash = { 0, 2, 1, 3 };
+static const uint8_t tracker_order[4] TRACKER_flash = {
+    0, 2, 1, 3
+};
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool tracker_finite(float a)

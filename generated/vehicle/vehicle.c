@@ -18,7 +18,9 @@
 #endif
 
 /* inner position -> index into x */
-static const uint8_t vehicle_order[5] VEHICLE_flash = { 0, 1, 2, 4, 3 };
+static const uint8_t vehicle_order[5] VEHICLE_flash = {
+    0, 1, 2, 4, 3
+};
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool vehicle_finite(float a)

@@ -18,7 +18,9 @@
 #endif
 
 /* inner position -> index into x */
-static const uint8_t vehicle_tutorial_order[4] VEHICLE_TUTORIAL_flash = { 0, 2, 1, 3 };
+static const uint8_t vehicle_tutorial_order[4] VEHICLE_TUTORIAL_flash = {
+    0, 2, 1, 3
+};
 
 /* false for NaN and for infinity: their difference from themselves is NaN */
 static bool vehicle_tutorial_finite(float a)

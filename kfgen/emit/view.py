@@ -66,7 +66,6 @@ class Data:
     title: str = ""
     comment: str = ""
     size: int = 0
-    values: str = ""
     reader: str = ""  # the macro that reads an entry
     lines: tuple[str, ...] = ()
 
@@ -201,7 +200,7 @@ class _ViewMaker:
             functions=functions,
             constants=tuple(
                 Data(name=f"{self.name}_{key}", reader=f"{self.NAME}_{key}", comment=_TABLES.get(key, _TABLES["order"]),
-                     size=len(values), values="{ " + ", ".join(map(str, values)) + " }")
+                     size=len(values), lines=tuple(_fill(", ".join(map(str, values)), WIDTH - 6)))
                 for key, values in code.constants.items()
             ),
             tables=tuple(self.table_data()),
