@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import pytest
 
+from kfgen.cost import Cost, measure
 from kfgen.generate import build
 from kfgen.override import override
 from kfgen.simulate import simulate
 from kfgen.spec import loads
 from tests.benchmarks.budgets import Ceiling
-from tests.benchmarks.measure import Cost, measure
 from tests.oracle.problems import IMM3
 
 MOST = Ceiling(instructions=1300, flash=4500, ram=200, stack=200)
