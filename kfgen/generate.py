@@ -9,8 +9,11 @@ from kfgen.emit.view import View, make_view
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
+from kfgen.fixed.build import FixedFilter, build_fixed
+from kfgen.fixed.scalar import Fixed
 from kfgen.ir.count import operations
 from kfgen.ir.schedule import RESERVED
+from kfgen.logs import Log
 from kfgen.scalars import SCALARS
 from kfgen.spec.types import Spec
 
@@ -32,15 +35,19 @@ class Generated:
     summary: Summary
     code: FilterCode
     view: View
+    fixed: FixedFilter | None = None
 
 
-def build(spec: Spec, scalar: str | None = None) -> Generated:
-    """Generate a spec's files. scalar overrides the spec's. Raises SpecError."""
+def build(spec: Spec, scalar: str | None = None, log: Log | None = None) -> Generated:
+    """Generate a spec's files. scalar overrides the spec's; log: what a q scalar takes its ranges from, beside
+    simulated runs. Raises SpecError.
+    """
     overridden = scalar is not None and scalar != spec.scalar
     if scalar is not None:
         spec = replace(spec, scalar=scalar)
-    # a scalar that is not built yet is refused by name, with all else that is not
-    code = build_filter(spec, SCALARS.get(spec.scalar, SCALARS["float"]), RESERVED)
+    if spec.scalar not in SCALARS:
+        return _fixed(spec, overridden, log)
+    code = build_filter(spec, SCALARS[spec.scalar], RESERVED)
     try:
         view = make_view(code, SCALARS[spec.scalar], overridden)
     except OverflowError as error:
@@ -48,6 +55,19 @@ def build(spec: Spec, scalar: str | None = None) -> Generated:
         raise SpecError.at(
             place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
         ) from None
+    return Generated(render(view), summary(code, view), code, view)
+
+
+def _fixed(spec: Spec, overridden: bool, log: Log | None) -> Generated:
+    scalar = Fixed(spec.scalar, spec.fixed.rounding)
+    real = build_filter(spec, scalar, RESERVED)
+    result = build_fixed(real, scalar, log)
+    view = make_view(result.code, scalar, overridden, result.view)
+    return Generated(render(view), summary(real, view), result.code, view, result)
+
+
+def summary(code: FilterCode, view: View) -> Summary:
+    """What the build table shows of a filter."""
     rows = []
     for function in code.functions:
         counts = operations(function.body)
@@ -57,7 +77,7 @@ def build(spec: Spec, scalar: str | None = None) -> Generated:
     if code.order != tuple(range(len(code.order))):
         notes.append("inner order: " + " ".join(code.model.states[i] for i in code.order))
     notes += code.remarks
-    return Generated(render(view), Summary(rows, view.ram, notes), code, view)
+    return Summary(rows, view.ram, notes)
 
 
 def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:

@@ -20,8 +20,6 @@ def unbuilt(spec: Spec) -> list[Mistake]:
     if spec.imm is not None:
         refuse(spec.imm.place, "imm", "describe a single filter")
         return out
-    if spec.scalar not in ("float", "double"):
-        refuse(spec.places.get("scalar", spec.place), f"scalar: {spec.scalar}", "use float or double")
     code = spec.code
     for key, wanted in {
         "unroll": code.unroll == "none", "flash": code.flash, "ram": code.ram, "stack": code.stack,

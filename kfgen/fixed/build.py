@@ -1,0 +1,90 @@
+"""A fixed-point filter of a real one: runs, formats, integers, report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from kfgen.emit.view import FixedPoint
+from kfgen.errors import KfgenError, SpecError
+from kfgen.filters.base import FilterCode
+from kfgen.fixed import tables
+from kfgen.fixed.cells import find_arrays
+from kfgen.fixed.expressions import Tally, size_of
+from kfgen.fixed.formats import Formats, choose
+from kfgen.fixed.lowering import lower
+from kfgen.fixed.random import Random
+from kfgen.fixed.real import Ranges, RealProgram
+from kfgen.fixed.routines import closure
+from kfgen.fixed.runs import Runner
+from kfgen.fixed.scalar import Fixed
+from kfgen.fixed.unroll import unrolled
+from kfgen.logs import Log
+from kfgen.simulate import simulate
+
+RUNS = ((1, 1.0, 0.0), (2, 1.0, 0.0), (3, 2.0, 0.02))  # seed, factor of the noises, share of outliers
+STEPS = 300
+
+
+@dataclass(frozen=True)
+class FixedFilter:
+    """The integer filter and what is to be said of it."""
+
+    code: FilterCode
+    real: FilterCode
+    formats: Formats
+    tallies: dict[str, Tally]
+    view: FixedPoint
+
+
+def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> FixedFilter:
+    """Scale and lower a filter. log: runs beside the simulated ones. Raises SpecError where ranges do not fit."""
+    real = replace(code, functions=tuple(unrolled(f, code.constants) for f in code.functions))
+    functions = list(real.functions)
+    arrays, ranges = find_arrays(functions), Ranges()
+    runner = Runner(real, RealProgram(functions, arrays, ranges), ranges)
+    spec = code.model.spec
+    if log is not None:
+        runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
+    for seed, gain, outliers in RUNS:
+        try:
+            drawn = simulate(spec, STEPS, random=Random(seed, gain, outliers))
+        except KfgenError as error:
+            if seed == 1 and log is None:
+                raise SpecError.at(spec.place, f"the ranges could not be found: {error}", "give a log") from None
+            continue
+        runner.run({name: column.tolist() for name, column in drawn.columns.items()}, drawn.rows)
+    scale = None if spec.fixed.scale is None else _exponents(code)
+    formats = choose(real, arrays, ranges, scalar.bits, scale)
+    lowered = lower(real, formats)
+    view = FixedPoint(scalar.bits, _units(lowered.code, formats), _table(formats), scalar.rounding == "floor", closure,
+                      tables)  # fmt: skip
+    return FixedFilter(lowered.code, real, formats, lowered.tallies, view)
+
+
+def _exponents(code: FilterCode) -> dict[str, int]:
+    from kfgen.spec.constants import value
+
+    spec = code.model.spec
+    return {name: size_of(value(e.tree, spec)) - 1 for name, e in (spec.fixed.scale or {}).items()}
+
+
+def _units(code: FilterCode, formats: Formats) -> tuple[tuple[str, int], ...]:
+    spec = code.model.spec
+    out = [(s.name, formats.arrays.element(("array", "kf.x"), i)) for i, s in enumerate(spec.states)]
+    out += [(each.name, ("number", f"u.{each.name}")) for each in spec.inputs]
+    out += [(each.name, ("number", f"kf.parameters.{each.name}")) for each in spec.parameters]
+    out += [
+        (f"{s.name}_{c.name}", ("number", f"update_{s.name}", f"z.{c.name}"))
+        for s in spec.measurements for c in s.components
+    ]  # fmt: skip
+    if spec.dt is not None and spec.dt.run_time:
+        out.append(("dt", ("number", "dt")))
+    return tuple((name.upper(), formats.fixed[cell]) for name, cell in out)
+
+
+def _table(formats: Formats) -> tuple[str, ...]:
+    width = max((len(q.name) for q in formats.report), default=0)
+    return tuple(
+        f"{q.name:<{width}}  2^{q.e:<4} to {q.largest:<9.4g} {q.headroom:>2} bits {q.raised}".rstrip()
+        for q in formats.report
+    )

@@ -1,0 +1,79 @@
+"""q<m>.<n> as a scalar type: how integers are spelled, and what its operations give, bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+from kfgen.fixed import arithmetic
+from kfgen.fixed.arithmetic import Status
+
+PREFIX = "q_"
+
+
+class Fixed:
+    """int32_t, every value with a binary point of its own, which the program knows and the number does not."""
+
+    helpers = "helpers_q.j2"
+    helper_ops = frozenset({"segment"})
+    silent_ops = frozenset({"q_min", "q_max", "q_sign", "q_atan2", "q_floor", "q_count"})
+    c_type = "int32_t"
+    size = 4
+    epsilon = Fraction(1, 2**26)
+    smallest = Fraction(0)
+
+    def __init__(self, name: str, rounding: str = arithmetic.NEAREST) -> None:
+        self.name = name
+        self.bits = int(name.partition(".")[2])
+        self.rounding = rounding
+        self.status = Status()
+
+    def literal(self, value: Fraction) -> str:
+        assert value.denominator == 1, "a constant of the integer program"
+        return "INT32_MIN" if value == -(2**31) else str(int(value))
+
+    def nearest(self, value: Fraction) -> Fraction:
+        return value
+
+    def function(self, op: str) -> str:
+        return op
+
+    def convert(self, value: Any) -> Any:
+        return int(value)
+
+    def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
+        if op.startswith(PREFIX):
+            name = op.removeprefix(PREFIX)
+            if op in _OPERATIONS:
+                return _OPERATIONS[op](data, *args)
+            given = [*args, *(data or ())]
+            if name in _ROUNDED:
+                return getattr(arithmetic, name)(*given, self.status, self.rounding)
+            if op in self.silent_ops:
+                return getattr(arithmetic, name)(*given)
+            return getattr(arithmetic, name)(*given, self.status)
+        value = _OPERATIONS[op](data, *args)
+        if not isinstance(value, bool) and not -(2**31) <= value < 2**31:
+            raise OverflowError(f"{op} of {args}: a sum that was proved to fit does not")
+        return value
+
+
+_ROUNDED = {"mul", "madd", "shift", "narrow"}
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "add": lambda d, a, b: a + b,
+    "sub": lambda d, a, b: a - b,
+    "mul": lambda d, a, b: a * b,
+    "neg": lambda d, a: -a,
+    "lt": lambda d, a, b: a < b,
+    "le": lambda d, a, b: a <= b,
+    "not": lambda d, a: not a,
+    "segment": lambda d, a: sum(1 for v in d.x if v <= a),
+    "table_x": lambda d, i: int(d.starts()[i]),
+    "table_y": lambda d, i: int(d.values()[i]),
+    "table_slope": lambda d, i: int(d.slopes()[i]),
+    "q_min": lambda d, a, b: min(a, b),
+    "q_max": lambda d, a, b: max(a, b),
+    "q_sign": lambda d, a: (a > 0) - (a < 0),
+    "q_count": lambda d, a: min(a, 2**31 - 1),
+}
