@@ -19,7 +19,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,12 +46,11 @@ def simulate(
     seed: int = 0,
     every: Mapping[str, int] | None = None,
     gaps: float = 0.0,
-    random: Any = None,
 ) -> Log:
     """A log of `steps` rows, the truth in columns `true.<state>`; the same for the same seed.
 
     every: sensor -> it measures in each so many-th row only (default 1). gaps: the share of readings that are
-    lost at random. random: a generator to draw from in place of numpy's with that seed. Raises KfgenError where the model leaves the finite numbers, or a covariance is none.
+    lost at random. Raises KfgenError where the model leaves the finite numbers, or a covariance is none.
     """
     if steps < 1:
         raise KfgenError(f"a log needs at least one step, not {steps}")
@@ -60,7 +58,7 @@ def simulate(
     if unknown:
         known = ", ".join(sensor.name for sensor in spec.measurements)
         raise KfgenError(f"unknown sensor `{unknown[0]}` (known: {known})")
-    random = np.random.default_rng(seed) if random is None else random
+    random = np.random.default_rng(seed)
     try:
         with np.errstate(all="ignore"):
             return _simulate(spec, steps, random, every or {}, gaps)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from kfgen.emit.view import FixedPoint
-from kfgen.errors import KfgenError, SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed import tables
 from kfgen.fixed.cells import find_arrays
@@ -18,8 +17,8 @@ from kfgen.fixed.routines import closure
 from kfgen.fixed.runs import Runner
 from kfgen.fixed.scalar import Fixed
 from kfgen.fixed.unroll import unrolled
+from kfgen.fixed.weather import Weather
 from kfgen.logs import Log
-from kfgen.simulate import simulate
 
 RUNS = ((1, 1.0, 0.0), (2, 1.0, 0.0), (3, 2.0, 0.02))  # seed, factor of the noises, share of outliers
 STEPS = 300
@@ -45,14 +44,9 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     spec = code.model.spec
     if log is not None:
         runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
+    weather = Weather(code.model)
     for seed, gain, outliers in RUNS:
-        try:
-            drawn = simulate(spec, STEPS, random=Random(seed, gain, outliers))
-        except KfgenError as error:
-            if seed == 1 and log is None:
-                raise SpecError.at(spec.place, f"the ranges could not be found: {error}", "give a log") from None
-            continue
-        runner.run({name: column.tolist() for name, column in drawn.columns.items()}, drawn.rows)
+        runner.run(*weather.log(STEPS, Random(seed, gain, outliers)))
     scale = None if spec.fixed.scale is None else _exponents(code)
     formats = choose(real, arrays, ranges, scalar.bits, scale)
     lowered = lower(real, formats)

@@ -20,6 +20,7 @@ from kfgen.ir.program import Function
 LIMIT = 2**31 - 1
 LEAST = -(2**31)
 DYNAMIC = 64  # a reciprocal whose runs span more than this is made with each quotient
+USEFUL = 20  # bits: a product of two full factors has no use for more than 62 less these
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
 
 
@@ -285,6 +286,9 @@ class Expressions:
             return self.value(node.args[1] if condition.constant else node.args[2], e)
         if e is None:
             e = self.natural(node)
+            live = [self.value(n).e for n in node.args[1:] if n.constant is None]
+            if e is not None and live:
+                e = max(e, min(live))
         a, b = (self.value(n, e) for n in node.args[1:])
         if e is None:
             e = max(a.e, b.e) if a.size and b.size else (a.e if a.size else b.e)
@@ -456,10 +460,16 @@ class Expressions:
                 rb = self.value(b)
                 rb = replace(rb, e=rb.e + exact.e)
                 return rb if exact.node.constant == 1 else self.negative(rb)
+        fine = e is None
         if e is None:
             e = self.natural(node)
         if e is None:
             e = self._guess((a, b)) if a.constant is None else self._guess((b,)) + size_of(a.constant)
+        elif fine and not (self._inverse_of(a) or self._inverse_of(b)):
+            if a.constant is None:  # what one LSB of either factor makes is below any use
+                e = max(e, self.value(a).e + self.value(b).e + USEFUL)
+            else:
+                e = max(e, self.value(b).e + size_of(a.constant) - 4)
         return self._product(a, b, e)
 
     def _product(self, a: Node, b: Node, e: int) -> Raw:
@@ -501,10 +511,13 @@ class Expressions:
         return Raw(make("select", (condition, one.node, constant(0))), e, -LIMIT, LIMIT)
 
     def quotient(self, node: Node, e: int | None) -> Raw:
+        fine = e is None
         if e is None:
             e = self.natural(node)
         a, b = node.args
         den = self.value(b)
+        if fine and e is not None and a.constant is None:
+            e = max(e, self.value(a).e - den.e - BITS - 3)
         if e is None:
             e = (0 if a.constant is not None else self.value(a).e) - den.e - BITS // 2
         return self._divided(self.value(a), den, e)

@@ -46,7 +46,7 @@ def lower(code: FilterCode, formats: Formats) -> Lowered:
     lowered = replace(
         code, blocks=tuple(blocks), functions=tuple(done.values()),
         tables={tables[t]: name for t, name in code.tables.items() if t in tables},
-        lookups=tuple(lookups[c][0] for c in code.lookups if c in lookups),
+        lookups=tuple(lookups[c][0] for c in code.lookups if c in lookups), constants={},
     )  # fmt: skip
     return Lowered(lowered, tallies)
 

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
-import numpy as np
-
 _MASK = (1 << 64) - 1
 
 
 class Random:
-    """What `kfgen.simulate` asks of a generator (splitmix64; Steele, Lea & Flood 2014).
+    """A generator (splitmix64; Steele, Lea & Flood 2014).
 
     gain: factor of every normal number. outliers: the share of them that is ten times as large again.
     """
@@ -29,24 +24,10 @@ class Random:
         z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
         return ((z ^ (z >> 31)) >> 11) * 2.0**-53
 
-    def uniform(self, low: float, high: float, size: int) -> Any:
-        return np.array([low + (high - low) * self.random() for _ in range(size)])
-
-    def standard_normal(self, size: int) -> Any:
-        return np.array([self._normal() for _ in range(size)])
+    def standard_normal(self, size: int) -> list[float]:
+        return [self._normal() for _ in range(size)]
 
     def _normal(self) -> float:
         value = sum(self.random() for _ in range(12)) - 6.0  # close to normal, and without a logarithm
         far = self.outliers > 0 and self.random() < self.outliers
         return value * self.gain * (10.0 if far else 1.0)
-
-    def choice(self, count: int, p: Any) -> int:
-        drawn, total = self.random(), 0.0
-        for i in range(count):
-            total += float(p[i])
-            if drawn < total:
-                return i
-        return count - 1
-
-    def integers(self, low: int, high: int) -> int:
-        return low + int(math.floor(self.random() * (high - low)))
