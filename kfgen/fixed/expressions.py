@@ -18,8 +18,10 @@ from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import Function
 
 LIMIT = 2**31 - 1
+INSIDE = 2**30 - 1  # what every number inside is clipped to: then a product of two by 2^-30, and a sum of two, fit
 LEAST = -(2**31)
 DYNAMIC = 64  # a reciprocal whose runs span more than this is made with each quotient
+FIRST = 17  # the least shift of a product that has been proved to fit
 USEFUL = 20  # bits: a product of two full factors has no use for more than 62 less these
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
 
@@ -57,6 +59,7 @@ class Context:
     lookups: dict[Constants, tuple[Constants, int]] = field(default_factory=dict)
     locals: dict[str, Raw] = field(default_factory=dict)
     known: dict[str, Node] = field(default_factory=dict)  # integer and truth values that folded
+    planned: dict[str, int] = field(default_factory=dict)  # exponents of locals that make the products they are in fit
     inverses: dict[str, tuple[Raw, Node | None]] = field(default_factory=dict)  # 1/x, 0 unless the condition holds
     tally: Tally = field(default_factory=Tally)
     risks: Counter[str] = field(default_factory=Counter)
@@ -253,11 +256,12 @@ class Expressions:
 
     def outside(self, path: str) -> bool:
         """Whether a field is written by the user, and may hold any integer."""
-        return not path.startswith("kf.") or path.startswith("kf.parameters.")
+        return not path.startswith("kf.") or path.startswith(("kf.parameters.", "kf.nis", "kf.log_likelihood"))
 
     def cell(self, node: Node, cell: tuple[object, ...], outside: bool) -> Raw:
         e = self.c.formats.of(cell)
-        return Raw(node, -self.c.formats.bits if e is None else e, LEAST if outside else -LIMIT, LIMIT)
+        low, high = (LEAST, LIMIT) if outside else (-INSIDE, INSIDE)
+        return Raw(node, -self.c.formats.bits if e is None else e, low, high)
 
     def literal(self, value: Fraction, e: int | None) -> Raw:
         if value == 0:
@@ -402,20 +406,35 @@ class Expressions:
                 ra = self.negative(ra)
             else:
                 rb = self.negative(rb)
-        low, high = _interval(ra, rb, s)
         if total is None:
             return self._mul(ra, rb, s, e)
+        low, high = _interval(ra, rb, s)
+        if self.small(ra) and self.small(rb) and s >= FIRST:
+            for begin in (total, self.fit(total)):
+                if -LIMIT <= begin.low + low and begin.high + high <= LIMIT:
+                    self.c.tally.proved += 1
+                    node = make("q_fma", (begin.node, ra.node, rb.node), (s,))
+                    return Raw(node, e, begin.low + low, begin.high + high)
         low, high = total.low + low, total.high + high
-        fits = -LIMIT <= low and high <= LIMIT
-        self.c.tally.proved += fits
-        self.c.tally.guarded += not fits
+        self.c.tally.guarded += 1
         return Raw(make("q_madd", (total.node, ra.node, rb.node), (s,)), e, max(low, -LIMIT), min(high, LIMIT))
+
+    def small(self, a: Raw) -> bool:
+        return a.size <= INSIDE
+
+    def fit(self, a: Raw) -> Raw:
+        """Clipped to what is allowed inside."""
+        if self.small(a):
+            return a
+        self.c.tally.guarded += 1
+        return Raw(make("q_fit", (a.node,)), a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
 
     def _mul(self, a: Raw, b: Raw, s: int, e: int) -> Raw:
         low, high = _interval(a, b, s)
-        fits = -LIMIT <= low and high <= LIMIT
-        self.c.tally.proved += fits
-        self.c.tally.guarded += not fits
+        if self.small(a) and self.small(b) and s >= FIRST and -LIMIT <= low and high <= LIMIT:
+            self.c.tally.proved += 1
+            return Raw(make("q_fma", (constant(0), a.node, b.node), (s,)), e, low, high)
+        self.c.tally.guarded += 1
         return Raw(make("q_mul", (a.node, b.node), (s,)), e, max(low, -LIMIT), min(high, LIMIT))
 
     def _shifted_product(self, a: Raw, b: Raw, e: int) -> Raw:
@@ -444,8 +463,11 @@ class Expressions:
         s = e - rb.e - exact.e
         if s < 0:
             exact = self.literal(value, e - rb.e)
-        elif s > 62:
-            exact = self.literal(value, e - rb.e - 62)
+        elif s < FIRST and exact.size << (FIRST - s) <= INSIDE:
+            exact = self.literal(value, e - rb.e - FIRST)
+        elif s > 32:  # fewer digits of the constant, but 24 of them
+            exact = self.literal(value, max(e - rb.e - 32, min(exact.e + 6, e - rb.e - 32)) if s <= 38 else
+                                 e - rb.e - min(s - 6, 62))  # fmt: skip
         if exact.node.constant == 0:
             return None, None, 0
         return exact, rb, e - rb.e - exact.e

@@ -15,7 +15,8 @@ from kfgen.fixed.cells import Arrays, Cell
 from kfgen.fixed.real import Ranges
 from kfgen.ir.nodes import Node
 
-BITS = 31  # of a size
+BITS = 30  # of the size of a number inside: sums of two then fit an int32_t
+OUTSIDE = 31  # of one that the user reads or writes
 HEADROOM = 2  # bits above the largest value of the runs
 SPARE = 1  # bits above a declared range
 SLACK = 1.02  # of a run's figures, so that the last digit of a platform's libm decides nothing
@@ -26,9 +27,9 @@ def above(value: float) -> int:
     return math.frexp(abs(value) * SLACK)[1] if value else -1022
 
 
-def exponent(value: float, headroom: int) -> int:
+def exponent(value: float, headroom: int, bits: int = BITS) -> int:
     """The e at which value has that many bits of head-room."""
-    return above(value) + headroom - BITS
+    return above(value) + headroom - bits
 
 
 @dataclass
@@ -43,7 +44,7 @@ class Quantity:
     @property
     def headroom(self) -> int:
         """Bits between the largest value and the format's end."""
-        return self.e + BITS - above(self.largest)
+        return self.e + OUTSIDE - above(self.largest)
 
 
 @dataclass
@@ -70,6 +71,12 @@ class Formats:
         """The exponent for the value of a node."""
         largest = self.ranges.largest(node)
         return exponent(largest, headroom) if largest else None
+
+
+    def least(self, node: Node) -> int | None:
+        """The finest exponent at which the runs' values still fit, with a little to spare."""
+        largest = self.ranges.largest(node)
+        return exponent(1.25 * largest, 0) if largest else None
 
 
 def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, scale: Mapping[str, int] | None) -> Formats:
@@ -140,7 +147,7 @@ class _Interface:
                   most: str = "") -> int:  # fmt: skip
         seen = self.f.ranges.largest(cell)
         largest = max(declared, seen)
-        e = exponent(largest, headroom if declared < seen else SPARE) if largest else -self.f.bits
+        e = exponent(largest, headroom if declared < seen else SPARE, OUTSIDE) if largest else -self.f.bits
         raised = ""
         if least is not None and least > e:
             e, raised = least, most
@@ -158,7 +165,7 @@ class _Interface:
         declared = max(self._limit(state.range), self._limit(state.bounds), float(self.model.periods[i] or 0) / 2)
         variance = self._variance(i)
         # P_ii has the LSB 2^(2 e + n) outside, and has to fit there too
-        least = math.ceil((above(variance) + 1 - BITS - self.f.bits) / 2) if variance else None
+        least = math.ceil((above(variance) + 1 - OUTSIDE - self.f.bits) / 2) if variance else None
         if self.model.periods[i] is not None:  # wrapped before it is stored
             self.f.ranges.see(cell, float(self.model.periods[i] or 0) / 2)
         return self._quantity(cell, state.name, declared, HEADROOM + 1, least, "so that its variance fits")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.cells import Cell, affine, array_of, number_of
 from kfgen.fixed.expressions import DYNAMIC, LIMIT, Context, Expressions, QTable, Tally, constant, nearest
-from kfgen.fixed.formats import Formats
+from kfgen.fixed.formats import BITS, Formats
 from kfgen.fixed.unroll import make
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
@@ -55,6 +56,93 @@ def _raw(value: Fraction, e: int | None, bits: int) -> Fraction:
     return Fraction(max(-LIMIT, min(LIMIT, nearest(value, -bits if e is None else e))))
 
 
+class Plan:
+    """Exponents of locals, from the last use to the first: as fine as the products need in which they stand.
+
+    A product of two numbers below 2^30 fits where it is shifted by 30. So a gain is given less head-room where the
+    runs allow it, for the sake of plain multiply-adds that cannot overflow.
+    """
+
+    def __init__(self, context: Context, x: Expressions, ties: dict[str, Cell], exponent: Callable[[Cell], int],
+                 target: Callable[[Store | Assign], Cell]) -> None:  # fmt: skip
+        self.c = context
+        self.x = x
+        self.ties = ties
+        self.exponent = exponent
+        self.target = target
+        self.wants: dict[str, list[int]] = {}
+        self.nodes: dict[str, Node] = {}
+
+    def run(self, body: list[Statement]) -> None:
+        for s in walk(body):
+            if isinstance(s, Let) and s.node.kind == "real":
+                self.nodes[s.name] = s.node
+        for s in reversed(list(walk(body))):
+            if isinstance(s, Let) and s.node.kind == "real":
+                self._let(s)
+            elif isinstance(s, Store | Assign) and s.node.kind == "real":
+                self._visit(s.node, self.exponent(self.target(s)))
+            else:
+                for root in roots(s):
+                    self._visit(root, None)
+
+    def _let(self, s: Let) -> None:
+        e = self.exponent(self.ties[s.name]) if s.name in self.ties else None
+        natural, least = self.c.formats.node(s.node), self.c.formats.least(s.node)
+        wants = self.wants.get(s.name, [])
+        if e is None and wants and natural is not None and least is not None:
+            fitting = [w for w in wants if least <= w < natural]
+            if fitting:
+                e = self.c.planned[s.name] = min(fitting)
+        self._visit(s.node, e)
+
+    def _of(self, node: Node) -> int | None:
+        """The exponent that a factor will have."""
+        if node.op == "variable":
+            inner = self.nodes.get(node.data)
+            if node.data in self.ties:
+                return self.exponent(self.ties[node.data])
+            if node.data in self.c.planned:
+                return self.c.planned[node.data]
+            return None if inner is None else self._of(inner) if inner.op in LEAVES else self.c.formats.node(inner)
+        if node.op == "field":
+            return self.exponent(number_of(self.c.function, node.data))
+        if node.op in ("element", "read"):
+            if not node.args:
+                return self.exponent(("variable", self.c.function.name, node.data))
+            return self.exponent(self.c.arrays.element(array_of(self.c.function, node.data), affine(node.args[0])[0]))
+        if node.op == "neg":
+            return self._of(node.args[0])
+        return self.c.formats.node(node)
+
+    def _visit(self, node: Node, e: int | None) -> None:
+        if node.op in ("sum", "mul", "add", "sub"):
+            e = self.c.formats.node(node) if e is None else e
+            terms = [(1, node.args)] if node.op == "mul" else self.x.terms(node)
+            for _, factors in terms:
+                if len(factors) == 1 and factors[0].op == "mul":
+                    factors = factors[0].args
+                if len(factors) == 2:
+                    for a, b in (factors, factors[::-1]):
+                        self._product(a, b, e)
+                for f in factors:
+                    self._visit(f, None)
+            return
+        for a in node.args:
+            self._visit(a, e if node.op == "select" else None)
+
+    def _product(self, a: Node, b: Node, e: int | None) -> None:
+        """What a has to be for a b to fit."""
+        if a.op == "neg":
+            a = a.args[0]
+        partner = None if b.constant is not None else self._of(b)
+        if a.op == "variable" and e is not None and partner is not None:
+            self.wants.setdefault(a.data, []).append(e - partner - BITS)
+
+
+LEAVES = ("element", "field", "read", "variable")
+
+
 class _Statements:
     def __init__(self, context: Context, done: dict[str, Function]) -> None:
         self.c = context
@@ -65,6 +153,7 @@ class _Statements:
 
     def function(self) -> Function:
         self._ties()
+        Plan(self.c, self.x, self.ties, self.exponent, self.target).run(self.f.body)
         body = _tidied(alive(self.block(self.f.body)))
         arguments = self.f.arguments
         if self.f.private:
@@ -141,16 +230,26 @@ class _Statements:
         if node.op in ("element", "field", "read", "variable"):
             raw = self.x.value(node)
         else:
-            e = self.exponent(self.ties[name]) if name in self.ties else None
-            if e is not None:
+            e = self.exponent(self.ties[name]) if name in self.ties else self.c.planned.get(name)
+            if e is not None and name in self.ties:
                 least = self.c.formats.node(node, 0)
                 e = None if least is not None and least > e else e
             raw = self.x.value(node, e)
+            if not self.outside(name):
+                raw = self.x.fit(raw)
         if raw.node.constant is not None:
             self.c.locals[name] = raw
             return []
         self.c.locals[name] = replace(raw, node=make("variable", (), name))
         return [Let(raw.node, name)]
+
+    def outside(self, name: str) -> bool:
+        """Whether a local is stored where the user sees it, with all 31 bits."""
+        return name in self.ties and self._is_outside(self.ties[name])
+
+    def _is_outside(self, cell: Cell) -> bool:
+        return cell[1] in ("kf.x", "kf.nis", "kf.log_likelihood") or (cell[0] == "array" and cell[2] in ("P", "S", "Q", "R")
+                                                                     and not self.f.private)  # fmt: skip
 
     def inverse(self, s: Let) -> list[Statement] | None:
         """A reciprocal whose size varies much is not kept: every quotient is divided."""
@@ -185,6 +284,8 @@ class _Statements:
         if s.node.kind != "real":
             return replace(s, index=index, node=self.x.index(s.node))
         raw = self.x.value(s.node, self.exponent(self.target(s)))
+        if not self._is_outside(self.target(s)):
+            raw = self.x.fit(raw)
         node = raw.node
         if isinstance(s, Store) and raw.low < 0 and self._diagonal(s) and node.op == "variable":
             node = make("select", (make("lt", (constant(0), node), None, "bool"), node, constant(0)))

@@ -10,6 +10,7 @@ from kfgen.fixed import arithmetic
 from kfgen.fixed.arithmetic import Status
 
 PREFIX = "q_"
+INSIDE = 2**30 - 1
 
 
 class Fixed:
@@ -17,7 +18,7 @@ class Fixed:
 
     helpers = "helpers_q.j2"
     helper_ops = frozenset({"segment"})
-    silent_ops = frozenset({"q_min", "q_max", "q_sign", "q_atan2", "q_floor", "q_count"})
+    silent_ops = frozenset({"q_min", "q_max", "q_sign", "q_atan2", "q_floor", "q_count", "q_fma"})
     c_type = "int32_t"
     size = 4
     epsilon = Fraction(1, 2**26)
@@ -45,6 +46,14 @@ class Fixed:
     def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
         if op.startswith(PREFIX):
             name = op.removeprefix(PREFIX)
+            if op == "q_fma":
+                c, a, b = args
+                assert abs(a) <= INSIDE and abs(b) <= INSIDE, "factors that were proved to be small are not"
+                return self._proved(c + arithmetic.scale(a * b, data[0], self.rounding))
+            if op == "q_fit":
+                if abs(args[0]) > INSIDE:
+                    self.status.saturate()
+                return max(-INSIDE, min(INSIDE, args[0]))
             if op in _OPERATIONS:
                 return _OPERATIONS[op](data, *args)
             given = [*args, *(data or ())]
@@ -54,8 +63,11 @@ class Fixed:
                 return getattr(arithmetic, name)(*given)
             return getattr(arithmetic, name)(*given, self.status)
         value = _OPERATIONS[op](data, *args)
-        if not isinstance(value, bool) and not -(2**31) <= value < 2**31:
-            raise OverflowError(f"{op} of {args}: a sum that was proved to fit does not")
+        return value if isinstance(value, bool) else self._proved(value)
+
+    def _proved(self, value: int) -> int:
+        if not -(2**31) <= value < 2**31:
+            raise OverflowError("a value that was proved to fit does not")
         return value
 
 

@@ -8,7 +8,7 @@ from kfgen.ir.nodes import Node
 from kfgen.ir.program import Call, For, If, Statement, roots
 
 _FREE = {"const", "field", "element", "read", "variable", "counter", "real", "neg", "half", "finite", "bit", "lookup",
-         "q_count", "table_x", "table_y", "table_slope"}
+         "q_count", "q_fit", "table_x", "table_y", "table_slope"}
 _NAMES = {"lt": "compare", "le": "compare", "q_reciprocal": "div"}
 _SILENT = {"and", "or", "not"}
 
@@ -53,7 +53,7 @@ def _count(node: Node, counts: Counter[str]) -> None:
             counts["mul"] += sum(1 for _, factors in node.data if factors == 2)
         elif node.op in ("add", "sub", "q_add", "q_sub"):
             counts["add"] += 1
-        elif node.op == "q_madd":
+        elif node.op in ("q_madd", "q_fma"):
             counts["add"] += 1
             counts["mul"] += 1
         elif node.op not in _FREE and node.op not in _SILENT:
