@@ -1,0 +1,1 @@
+"""Fixed point: numbers of 32 bits with a binary point wherever it serves."""
