@@ -47,6 +47,11 @@ def render(view: View) -> dict[str, str]:
     }
 
 
+def macro(template: str, name: str, *arguments: Any, **options: Any) -> str:
+    """What one macro of a template file gives."""
+    return _tidy(str(getattr(_environment().get_template(template).module, name)(*arguments, **options)))
+
+
 def _tidy(text: str) -> str:
     """No line beyond the width for a comment's sake, no blanks at line ends, never two empty lines."""
     out: list[str] = []
