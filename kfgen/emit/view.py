@@ -33,7 +33,7 @@ STATUSES = (
     ("NOT_POSITIVE", 0x400, "a variance or dt is not positive"),
 )
 
-OWN = frozenset({"abs", "min", "max", "sign", "count", "fma", "fit"})
+OWN = frozenset({"abs", "min", "max", "sign", "count", "fma", "far", "fit", "mac"})
 """Routines of fixed point that stand in the template of the lowered program."""
 
 
@@ -244,7 +244,7 @@ class _ViewMaker:
         if self.fixed is None:
             return None
         used = {op.removeprefix("q_") for op in self.helpers if op.startswith("q_")}
-        used |= {"product", "round"} if "fma" in used else set()
+        used |= {"product", "round"} if used & {"fma", "far", "mac"} else set()
         used |= {"limit"} if used & {"fit", "abs"} else set()
         own = tuple(sorted(used & OWN))
         return Routines(self.fixed.closure(used - OWN), own, self.fixed.tables, self.fixed.floor)
@@ -412,7 +412,7 @@ def may_saturate(f: Function) -> bool:
         stack = list(roots(s))
         while stack:
             node = stack.pop()
-            if node.op.startswith("q_") and node.op not in ("q_min", "q_max", "q_sign", "q_count", "q_fma"):
+            if node.op.startswith("q_") and node.op not in ("q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far"):
                 return True
             stack += node.args
     return False

@@ -20,7 +20,8 @@ from kfgen.fixed.unroll import unrolled
 from kfgen.fixed.weather import Weather
 from kfgen.logs import Log
 
-RUNS = ((1, 1.0, 0.0), (2, 1.0, 0.0), (3, 2.0, 0.02))  # seed, factor of the noises, share of outliers
+RUNS = ((1, 1.0, 0.0, 0.0), (2, 1.0, 0.0, 0.5), (3, 2.0, 0.02, -0.5))
+"""Seed, factor of the noises, share of outliers, correlation of the states that is given now and then."""
 STEPS = 300
 
 
@@ -45,8 +46,8 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     if log is not None:
         runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
     weather = Weather(code.model)
-    for seed, gain, outliers in RUNS:
-        runner.run(*weather.log(STEPS, Random(seed, gain, outliers)))
+    for seed, gain, outliers, correlation in RUNS:
+        runner.run(*weather.log(STEPS, Random(seed, gain, outliers)), correlation)
     scale = None if spec.fixed.scale is None else _exponents(code)
     formats = choose(real, arrays, ranges, scalar.bits, scale)
     lowered = lower(real, formats)

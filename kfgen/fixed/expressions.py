@@ -22,6 +22,7 @@ INSIDE = 2**30 - 1  # what every number inside is clipped to: then a product of 
 LEAST = -(2**31)
 DYNAMIC = 64  # a reciprocal whose runs span more than this is made with each quotient
 FIRST = 17  # the least shift of a product that has been proved to fit
+LAST = 32  # the largest for which one form of it does
 USEFUL = 20  # bits: a product of two full factors has no use for more than 62 less these
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
 
@@ -34,6 +35,7 @@ class Raw:
     e: int
     low: int = -LIMIT
     high: int = LIMIT
+    clipped: Node | None = None  # the same, clipped to INSIDE, in one operation
 
     @property
     def size(self) -> int:
@@ -413,8 +415,14 @@ class Expressions:
             for begin in (total, self.fit(total)):
                 if -LIMIT <= begin.low + low and begin.high + high <= LIMIT:
                     self.c.tally.proved += 1
-                    node = make("q_fma", (begin.node, ra.node, rb.node), (s,))
-                    return Raw(node, e, begin.low + low, begin.high + high)
+                    args = (begin.node, ra.node, rb.node)
+                    node = make("q_fma" if s <= LAST else "q_far", args, (s,))
+                    clipped = make("q_mac", args, (s,)) if self.small(begin) and s <= LAST else None
+                    return Raw(node, e, begin.low + low, begin.high + high, clipped)
+            if s <= LAST:
+                self.c.tally.guarded += 1
+                node = make("q_mac", (self.fit(total).node, ra.node, rb.node), (s,))
+                return Raw(node, e, max(total.low + low, -INSIDE), min(total.high + high, INSIDE))
         low, high = total.low + low, total.high + high
         self.c.tally.guarded += 1
         return Raw(make("q_madd", (total.node, ra.node, rb.node), (s,)), e, max(low, -LIMIT), min(high, LIMIT))
@@ -427,13 +435,20 @@ class Expressions:
         if self.small(a):
             return a
         self.c.tally.guarded += 1
+        if a.clipped is not None:
+            return Raw(a.clipped, a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
         return Raw(make("q_fit", (a.node,)), a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
 
     def _mul(self, a: Raw, b: Raw, s: int, e: int) -> Raw:
         low, high = _interval(a, b, s)
+        args = (constant(0), a.node, b.node)
         if self.small(a) and self.small(b) and s >= FIRST and -LIMIT <= low and high <= LIMIT:
             self.c.tally.proved += 1
-            return Raw(make("q_fma", (constant(0), a.node, b.node), (s,)), e, low, high)
+            clipped = make("q_mac", args, (s,)) if s <= LAST else None
+            return Raw(make("q_fma" if s <= LAST else "q_far", args, (s,)), e, low, high, clipped)
+        if self.small(a) and self.small(b) and FIRST <= s <= LAST:
+            self.c.tally.guarded += 1
+            return Raw(make("q_mac", args, (s,)), e, max(low, -INSIDE), min(high, INSIDE))
         self.c.tally.guarded += 1
         return Raw(make("q_mul", (a.node, b.node), (s,)), e, max(low, -LIMIT), min(high, LIMIT))
 

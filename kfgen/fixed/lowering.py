@@ -94,6 +94,8 @@ class Plan:
             fitting = [w for w in wants if least <= w < natural]
             if fitting:
                 e = self.c.planned[s.name] = min(fitting)
+            elif min(wants) > natural + 2:  # finer than the products that it is in can use
+                e = self.c.planned[s.name] = min(min(wants) - 2, natural + 5)
         self._visit(s.node, e)
 
     def _of(self, node: Node) -> int | None:

@@ -10,6 +10,7 @@ from kfgen.filters.base import FilterCode
 from kfgen.fixed.real import Memory, Ranges, RealProgram
 
 Columns = Mapping[str, Sequence[float]]
+CORRELATED = 75  # rows between two covariances that are given
 EVERY = 16  # rows between two calls of the functions that a run does not need
 
 
@@ -46,12 +47,18 @@ class Runner:
         self.statuses[status] = self.statuses.get(status, 0) + 1
         return status
 
-    def run(self, log: Columns, rows: int) -> Memory:
-        """A whole log, as `kfgen run` would: predict, then the updates in the spec's order."""
+    def run(self, log: Columns, rows: int, correlation: float = 0.0) -> Memory:
+        """A whole log, as `kfgen run` would: predict, then the updates in the spec's order.
+
+        correlation: the states are given this one now and then, so that no part of a covariance is taken for zero
+        only because the first one is diagonal.
+        """
         memory = blank(self.code)
         self.call("init", memory)
         self._look(memory)
         for k in range(rows):
+            if correlation and k % CORRELATED == 0:
+                self._correlate(memory, correlation)
             self._inputs(memory, log, k)
             if self._step(memory, log, k):
                 self.call("predict", memory)
@@ -61,6 +68,21 @@ class Runner:
             if k % EVERY == 0 or k == rows - 1:
                 self._others(memory, k)
         return memory
+
+    def _correlate(self, memory: Memory, correlation: float) -> None:
+        if "get_covariance" not in self.names:
+            return
+        n = len(self.code.model.states)
+        self.call("get_covariance", memory)
+        P = memory.arrays["P"]
+        root = [math.sqrt(max(P[i * n + i], 0.0)) for i in range(n)]
+        sign = [1 if i % 2 or correlation > 0 else -1 for i in range(n)]
+        memory.arrays["P"] = [
+            root[i] * root[j] * (1.0 if i == j else abs(correlation) * sign[i] * sign[j])
+            for i in range(n) for j in range(n)
+        ]  # fmt: skip
+        self.call("set_covariance", memory)
+        self._look(memory)
 
     def _inputs(self, memory: Memory, log: Columns, k: int) -> None:
         for each in self.spec.inputs:

@@ -18,7 +18,7 @@ class Fixed:
 
     helpers = "helpers_q.j2"
     helper_ops = frozenset({"segment"})
-    silent_ops = frozenset({"q_min", "q_max", "q_sign", "q_atan2", "q_floor", "q_count", "q_fma"})
+    silent_ops = frozenset({"q_min", "q_max", "q_sign", "q_atan2", "q_floor", "q_count", "q_fma", "q_far"})
     c_type = "int32_t"
     size = 4
     epsilon = Fraction(1, 2**26)
@@ -46,10 +46,12 @@ class Fixed:
     def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
         if op.startswith(PREFIX):
             name = op.removeprefix(PREFIX)
-            if op == "q_fma":
+            if op in ("q_fma", "q_far"):
                 c, a, b = args
                 assert abs(a) <= INSIDE and abs(b) <= INSIDE, "factors that were proved to be small are not"
                 return self._proved(c + arithmetic.scale(a * b, data[0], self.rounding))
+            if op == "q_mac":
+                return self._mac(*args, data[0])
             if op == "q_fit":
                 if abs(args[0]) > INSIDE:
                     self.status.saturate()
@@ -64,6 +66,19 @@ class Fixed:
             return getattr(arithmetic, name)(*given, self.status)
         value = _OPERATIONS[op](data, *args)
         return value if isinstance(value, bool) else self._proved(value)
+
+    def _mac(self, c: int, a: int, b: int, s: int) -> int:
+        """c + a b / 2^s: the product clipped where it is beyond 2^30, then the sum."""
+        assert abs(a) <= INSIDE and abs(b) <= INSIDE and abs(c) <= INSIDE
+        product = a * b
+        if -(1 << (s + 30)) <= product < 1 << (s + 30):
+            total = c + arithmetic.scale(product, s, self.rounding)
+        else:
+            self.status.saturate()
+            total = c + (INSIDE if product > 0 else -INSIDE)
+        if abs(total) > INSIDE:
+            self.status.saturate()
+        return max(-INSIDE, min(INSIDE, total))
 
     def _proved(self, value: int) -> int:
         if not -(2**31) <= value < 2**31:
