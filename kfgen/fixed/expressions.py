@@ -20,8 +20,9 @@ from kfgen.ir.program import Function
 LIMIT = 2**31 - 1
 INSIDE = 2**30 - 1  # what every number inside is clipped to: then a product of two by 2^-30, and a sum of two, fit
 LEAST = -(2**31)
-DYNAMIC = 64  # a reciprocal whose runs span more than this is made with each quotient
+DYNAMIC = 1024  # a reciprocal whose runs span more than this is made with each quotient
 FIRST = 17  # the least shift of a product that has been proved to fit
+ROOMIER = 3  # bits that a product may lose so that it is proved to fit
 LAST = 32  # the largest for which one form of it does
 USEFUL = 20  # bits: a product of two full factors has no use for more than 62 less these
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
@@ -463,10 +464,12 @@ class Expressions:
     def _factors(self, a: Node, b: Node, e: int) -> tuple[Raw | None, Raw | None, int]:
         """Two factors and the shift that brings their product to e. A constant takes the digits that there are."""
         if a.constant is None:
-            ra, rb = self.value(a), self.value(b)
+            ra, rb = self.factor(a), self.factor(b)
             return ra, rb, e - ra.e - rb.e
-        rb = self.value(b)
+        rb = self.factor(b)
         value = a.constant
+        if not self.small(rb) and abs(value) <= Fraction(1, 4) and e >= rb.e - 1:
+            rb = self.at(rb, rb.e + 2)  # what the user gives has more bits than a plain product takes
         if value == 0 or rb.size == 0:
             return None, None, 0
         exact = self.literal(value, None)
@@ -486,6 +489,11 @@ class Expressions:
         if exact.node.constant == 0:
             return None, None, 0
         return exact, rb, e - rb.e - exact.e
+
+    def factor(self, node: Node) -> Raw:
+        """A value to be multiplied: inside of its range, unless it is the user's."""
+        raw = self.value(node)
+        return raw if node.op in ("field", "element", "variable") else self.fit(raw)
 
     def product(self, node: Node, e: int | None) -> Raw:
         a, b = node.args
@@ -508,6 +516,22 @@ class Expressions:
             else:
                 e = max(e, self.value(b).e + size_of(a.constant) - 4)
         return self._product(a, b, e)
+
+    def roomier(self, node: Node, e: int | None) -> int | None:
+        """An exponent a little coarser at which a product is proved to fit, if there is one."""
+        a, b = node.args
+        natural = self.natural(node)
+        if natural is None or self._inverse_of(a) or self._inverse_of(b):
+            return e
+        e = natural if e is None else e
+        raws = [self.value(f) for f in (a, b) if f.constant is None]
+        bound = Fraction(1)
+        for raw in raws:
+            bound *= raw.size * power(raw.e)
+        for f in (a, b):
+            bound *= 1 if f.constant is None else abs(f.constant)
+        needed = size_of(bound) - BITS if bound else e
+        return needed if e < needed <= natural + ROOMIER else e
 
     def _product(self, a: Node, b: Node, e: int) -> Raw:
         if self._inverse_of(a):

@@ -18,6 +18,7 @@ from kfgen.ir.nodes import Node
 BITS = 30  # of the size of a number inside: sums of two then fit an int32_t
 OUTSIDE = 31  # of one that the user reads or writes
 HEADROOM = 2  # bits above the largest value of the runs
+PASSING = 1  # the same for what is not kept
 SPARE = 1  # bits above a declared range
 SLACK = 1.02  # of a run's figures, so that the last digit of a platform's libm decides nothing
 
@@ -67,7 +68,7 @@ class Formats:
             found = self.fixed[cell] = exponent(largest, HEADROOM)
         return found
 
-    def node(self, node: Node, headroom: int = HEADROOM) -> int | None:
+    def node(self, node: Node, headroom: int = PASSING) -> int | None:
         """The exponent for the value of a node."""
         largest = self.ranges.largest(node)
         return exponent(largest, headroom) if largest else None
