@@ -62,7 +62,9 @@ class Context:
     lookups: dict[Constants, tuple[Constants, int]] = field(default_factory=dict)
     locals: dict[str, Raw] = field(default_factory=dict)
     known: dict[str, Node] = field(default_factory=dict)  # integer and truth values that folded
+    nodes: dict[str, Node] = field(default_factory=dict)  # the real expressions of locals
     planned: dict[str, int] = field(default_factory=dict)  # exponents of locals that make the products they are in fit
+    signs: dict[Node, bool] = field(default_factory=dict)  # whether a value is known not to be negative
     inverses: dict[str, tuple[Raw, Node | None]] = field(default_factory=dict)  # 1/x, 0 unless the condition holds
     tally: Tally = field(default_factory=Tally)
     risks: Counter[str] = field(default_factory=Counter)
@@ -196,6 +198,8 @@ class Expressions:
     def value(self, node: Node, e: int | None = None) -> Raw:
         """A real expression in the format that suits it, or in that of exponent e."""
         raw = self._value(node, e)
+        if raw.low < 0 and node.op in ("sum", "mul", "div", "select", "sqrt") and self.nonnegative(node):
+            raw = replace(raw, low=0)
         return raw if e is None else self.at(raw, e)
 
     def natural(self, node: Node) -> int | None:
@@ -235,7 +239,8 @@ class Expressions:
                 array = array_of(c.function, node.data)
                 place = make(node.op, (self.index(node.args[0]),), node.data)
                 cell = c.arrays.element(array, affine(node.args[0])[0])
-                return self.cell(place, cell, node.data in ("kf.x", "x", "P", "S"))
+                raw = self.cell(place, cell, node.data in ("kf.x", "x", "P", "S"))
+                return replace(raw, low=0) if is_variance(node.data, node.args[0]) else raw
             case "read":
                 if not node.args:
                     return self.cell(node, ("variable", c.function.name, node.data), False)
@@ -397,7 +402,7 @@ class Expressions:
         if self._inverse_of(a) or self._inverse_of(b) or _is_scaled(a, b):
             product = self._product(a, b, e)
             return self._plus(total, sign, product, e)
-        ra, rb, s = self._factors(a, b, e)
+        ra, rb, s, most = self._factors(a, b, e)
         if ra is None or rb is None:
             return self._plus(total, sign, Raw(constant(0), e, 0, 0), e) if total is None else total
         if s == 0 and ra.node.constant == 1:
@@ -410,8 +415,8 @@ class Expressions:
             else:
                 rb = self.negative(rb)
         if total is None:
-            return self._mul(ra, rb, s, e)
-        low, high = _interval(ra, rb, s)
+            return self._mul(ra, rb, s, e, most)
+        low, high = self.span(ra, rb, s, most if sign > 0 else None)
         if self.small(ra) and self.small(rb) and s >= FIRST:
             for begin in (total, self.fit(total)):
                 if -LIMIT <= begin.low + low and begin.high + high <= LIMIT:
@@ -440,8 +445,14 @@ class Expressions:
             return Raw(a.clipped, a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
         return Raw(make("q_fit", (a.node,)), a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
 
-    def _mul(self, a: Raw, b: Raw, s: int, e: int) -> Raw:
-        low, high = _interval(a, b, s)
+    def span(self, a: Raw, b: Raw, s: int, most: int | None) -> tuple[int, int]:
+        """The interval of round(a b / 2^s); most: what is known of a b, which then is not negative."""
+        if most is None:
+            return _interval(a, b, s)
+        return 0, (most + (1 << s >> 1)) >> s
+
+    def _mul(self, a: Raw, b: Raw, s: int, e: int, most: int | None = None) -> Raw:
+        low, high = self.span(a, b, s, most)
         args = (constant(0), a.node, b.node)
         if self.small(a) and self.small(b) and s >= FIRST and -LIMIT <= low and high <= LIMIT:
             self.c.tally.proved += 1
@@ -461,23 +472,26 @@ class Expressions:
             return self._mul(self.at(a, a.e + extra), b, s - extra, e) if s - extra <= 62 else Raw(constant(0), e, 0, 0)
         return self.at(self._mul(a, b, 0, a.e + b.e), e)
 
-    def _factors(self, a: Node, b: Node, e: int) -> tuple[Raw | None, Raw | None, int]:
-        """Two factors and the shift that brings their product to e. A constant takes the digits that there are."""
+    def _factors(self, a: Node, b: Node, e: int) -> tuple[Raw | None, Raw | None, int, int | None]:
+        """Two factors, the shift that brings their product to e, and what the product cannot exceed, if it is known.
+
+        A constant takes the digits that there are.
+        """
         if a.constant is None:
             ra, rb = self.factor(a), self.factor(b)
-            return ra, rb, e - ra.e - rb.e
+            return ra, rb, e - ra.e - rb.e, self.share(a, b, ra, rb)
         rb = self.factor(b)
         value = a.constant
         if not self.small(rb) and abs(value) <= Fraction(1, 4) and e >= rb.e - 1:
             rb = self.at(rb, rb.e + 2)  # what the user gives has more bits than a plain product takes
         if value == 0 or rb.size == 0:
-            return None, None, 0
+            return None, None, 0, None
         exact = self.literal(value, None)
         if abs(int(exact.node.constant or 0)) == 1:  # a power of two: only the exponent changes
             sign = int(exact.node.constant or 0)
             rb = replace(rb, e=rb.e + exact.e)
             rb = rb if sign > 0 else self.negative(rb)
-            return Raw(constant(1), 0, 1, 1), self.at(rb, e), 0
+            return Raw(constant(1), 0, 1, 1), self.at(rb, e), 0, None
         s = e - rb.e - exact.e
         if s < 0:
             exact = self.literal(value, e - rb.e)
@@ -487,8 +501,8 @@ class Expressions:
             exact = self.literal(value, max(e - rb.e - 32, min(exact.e + 6, e - rb.e - 32)) if s <= 38 else
                                  e - rb.e - min(s - 6, 62))  # fmt: skip
         if exact.node.constant == 0:
-            return None, None, 0
-        return exact, rb, e - rb.e - exact.e
+            return None, None, 0, None
+        return exact, rb, e - rb.e - exact.e, None
 
     def factor(self, node: Node) -> Raw:
         """A value to be multiplied: inside of its range, unless it is the user's."""
@@ -547,14 +561,81 @@ class Expressions:
             a, b = b, a
         if a.constant is not None and b.op == "mul" and not b.args[0].constant:
             pass
-        ra, rb, s = self._factors(a, b, e)
+        ra, rb, s, most = self._factors(a, b, e)
         if ra is None or rb is None:
             return Raw(constant(0), e, 0, 0)
         if s == 0 and ra.node.constant == 1:
             return rb
         if not 0 <= s <= 62:
             return self._shifted_product(ra, rb, e)
-        return self._mul(ra, rb, s, e)
+        return self._mul(ra, rb, s, e, most)
+
+    # what cannot be negative, and shares of a whole ------------------------------------------------------
+
+    def definition(self, node: Node) -> Node:
+        """What a local stands for."""
+        while node.op == "variable" and node.data in self.c.nodes:
+            node = self.c.nodes[node.data]
+        return node
+
+    def nonnegative(self, node: Node) -> bool:
+        """Whether a value cannot be below zero, in integers as in real numbers, whatever the filter is given."""
+        found = self.c.signs.get(node)
+        if found is None:
+            self.c.signs[node] = False
+            found = self.c.signs[node] = self._nonnegative(self.definition(node))
+        return found
+
+    def _nonnegative(self, node: Node) -> bool:
+        match node.op:
+            case "const":
+                return bool(node.data >= 0)
+            case "element":
+                return is_variance(node.data, node.args[0])
+            case "sum" | "add":
+                return all(sign > 0 and (self.nonnegative(f[0]) if len(f) == 1 else self._square(*f))
+                           for sign, f in self.terms(node))  # fmt: skip
+            case "mul":
+                return self._square(*node.args)
+            case "div":
+                return all(map(self.nonnegative, node.args))
+            case "select":
+                return all(map(self.nonnegative, node.args[1:]))
+            case "sqrt" | "abs" | "exp":
+                return True
+        return False
+
+    def _square(self, a: Node, b: Node) -> bool:
+        """Whether a b is not negative: two that are not, or x (x d) with d that is not."""
+        if self.nonnegative(a) and self.nonnegative(b):
+            return True
+        for x, other in ((a, b), (b, a)):
+            if same(x, other):
+                return True
+            inner = self.definition(other)
+            if inner.op == "mul":
+                for y, d in (inner.args, inner.args[::-1]):
+                    if same(x, y) and self.nonnegative(d):
+                        return True
+        return False
+
+    def share(self, a: Node, b: Node, ra: Raw, rb: Raw) -> int | None:
+        """A bound of the product of a part of a whole, and the whole's reciprocal."""
+        for part, inverse, raw, over in ((a, b, ra, rb), (b, a, rb, ra)):
+            quotient = self.definition(inverse)
+            if quotient.op != "div" or quotient.args[0].constant != 1 or not self.nonnegative(part):
+                continue
+            whole = quotient.args[1]
+            if whole.op != "variable" or whole.data not in self.c.locals:
+                continue
+            inner = self.definition(whole)
+            if inner.op not in ("sum", "add") or not self.nonnegative(whole):
+                continue
+            if any(sign > 0 and len(f) == 1 and same(f[0], part) for sign, f in self.terms(inner)):
+                e = self.c.locals[whole.data].e
+                if e <= raw.e and raw.size << (raw.e - e) <= INSIDE:  # neither rounded nor clipped when it was added
+                    return (1 << max(-raw.e - over.e, 0)) + (1 << BITS)
+        return None
 
     # quotients -------------------------------------------------------------------------------------------
 
@@ -714,6 +795,18 @@ def _interval(a: Raw, b: Raw, s: int) -> tuple[int, int]:
         ends = [x * y for x in (a.low, a.high) for y in (b.low, b.high)]
     half = 1 << s >> 1
     return (min(ends) + half) >> s, (max(ends) + half) >> s
+
+
+def is_variance(path: str, index: Node) -> bool:
+    """Whether an element of the struct is a variance: what is stored there is never below zero."""
+    if path == "kf.D":
+        return True
+    if path != "kf.P" or index.constant is None:
+        return False
+    place, j = int(index.constant), 0
+    while j * (j + 3) // 2 < place:
+        j += 1
+    return j * (j + 3) // 2 == place
 
 
 def _is_product(node: Node) -> bool:

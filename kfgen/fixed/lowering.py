@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.cells import Cell, affine, array_of, number_of
-from kfgen.fixed.expressions import DYNAMIC, LIMIT, Context, Expressions, QTable, Tally, constant, nearest
+from kfgen.fixed.expressions import DYNAMIC, LIMIT, Context, Expressions, QTable, Tally, constant, is_variance, nearest
 from kfgen.fixed.formats import BITS, Formats
 from kfgen.fixed.unroll import make
 from kfgen.ir.nodes import Constants, Node, Table
@@ -76,7 +76,7 @@ class Plan:
     def run(self, body: list[Statement]) -> None:
         for s in walk(body):
             if isinstance(s, Let) and s.node.kind == "real":
-                self.nodes[s.name] = s.node
+                self.nodes[s.name] = self.c.nodes[s.name] = s.node
         for s in reversed(list(walk(body))):
             if isinstance(s, Let) and s.node.kind == "real":
                 self._let(s)
@@ -291,20 +291,9 @@ class _Statements:
         if not self._is_outside(self.target(s)):
             raw = self.x.fit(raw)
         node = raw.node
-        if isinstance(s, Store) and raw.low < 0 and self._diagonal(s) and node.op == "variable":
-            node = make("select", (make("lt", (constant(0), node), None, "bool"), node, constant(0)))
+        if isinstance(s, Store) and raw.low < 0 and s.index is not None and is_variance(s.name, s.index):
+            node = make("q_max", (node, constant(0)))
         return replace(s, index=index, node=node)
-
-    def _diagonal(self, s: Store) -> bool:
-        """Whether a variance is stored, which rounding must not leave below zero."""
-        if s.name == "kf.D":
-            return True
-        if s.name != "kf.P" or s.index is None or s.index.constant is None:
-            return False
-        place, j = int(s.index.constant), 0
-        while j * (j + 3) // 2 < place:
-            j += 1
-        return j * (j + 3) // 2 == place
 
     def call(self, s: Call) -> Call:
         args: list[str | Slice | Node] = []
