@@ -28,7 +28,7 @@ def _template(name: str) -> str:
 
 @cache
 def _environment() -> Environment:
-    return Environment(
+    environment = Environment(
         loader=FunctionLoader(_template),
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -36,6 +36,8 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
+    environment.filters |= {"u32": "UINT32_C({})".format, "i64": "INT64_C({})".format}
+    return environment
 
 
 def render(view: View) -> dict[str, str]:

@@ -88,3 +88,26 @@ def sqrt(a: int, s: int, status: Status) -> int:
         status.saturate()
         return 0
     return clamp((isqrt(scale(a, -(s + 2), FLOOR)) + 1) >> 1, status)
+
+
+def floor(a: int, fa: int) -> int:
+    """The largest whole number <= a; -LIMIT where that is -2^31."""
+    return max(a >> fa << fa, -LIMIT)
+
+
+def wrap(a: int, half: int, status: Status) -> int:
+    """a in (-half, half] by whole periods 2 half; half has 32 fraction bits more than a, 1 <= half / 2^32 < 2^31."""
+    value = a << 32
+    if -half < value <= half:
+        return a
+    turns = -((half - value) // (2 * half))  # ceil((value - half) / period)
+    most = half >> 32
+    return max(-most, min(most, narrow(value - turns * 2 * half, 32, status)))
+
+
+def hypot(a: int, b: int, status: Status) -> int:
+    """sqrt(a^2 + b^2), of the sum's 31 or 32 highest bits."""
+    square = a * a + b * b
+    spare = max(0, (square.bit_length() - 31) // 2 * 2)
+    root = isqrt(square >> spare << 32)
+    return clamp(scale(root, 16 - spare // 2), status)

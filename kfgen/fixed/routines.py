@@ -10,32 +10,54 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "limit": (),
     "round": ("sar",),
     "clamp": ("limit",),
-    "narrow": ("round", "clamp"),
+    "scale": ("round",),
+    "narrow": ("scale", "clamp"),
+    "near": ("narrow",),
     "product": ("sar32",),
     "mul": ("product", "narrow"),
-    "madd": ("product", "round", "clamp"),
+    "madd": ("product", "scale", "clamp"),
     "add": ("limit",),
     "sub": ("limit",),
     "shift": ("sar32", "limit"),
     "leading": (),
-    "mulh": (),
+    "wide": (),
+    "mulh": ("wide",),
     "signed": ("limit",),
     "inverse": ("mulh", "sar32"),
     "div": ("leading", "inverse", "mulh", "signed"),
     "reciprocal": ("leading", "inverse", "signed"),
     "root": ("mulh", "sar32"),
-    "sqrt": ("leading", "root", "limit"),
+    "sqrt": ("leading", "root", "limit", "signed"),
+    "floor": (),
+    "wrap": ("near",),
+    "hypot": ("leading", "wide", "root", "signed"),
+    "turn": ("wide", "mulh"),
+    "sine": ("wide", "mulh"),
+    "sin": ("turn", "sine", "near"),
+    "cos": ("turn", "sine", "near"),
+    "angle": ("leading", "wide", "inverse", "mulh"),
+    "atan2": ("angle", "round"),
+    "atan": ("angle", "near"),
+    "power": ("sar", "sar32", "mulh"),
+    "exp": ("power", "sar32", "near", "limit"),
+    "logarithm": ("wide", "product", "sar"),
+    "log": ("logarithm", "leading", "near", "limit"),
 }
 """Routine -> those that it calls itself. In the order of their definitions."""
 
 
-def closure(ops: Iterable[str]) -> tuple[str, ...]:
+ROUNDING_DOWN = {"scale": ("sar",), "near": ("round", "clamp")}
+"""What is different where products and shifts round down, and the functions do not."""
+
+
+def closure(ops: Iterable[str], floor: bool = False) -> tuple[str, ...]:
     """The routines that code which calls `ops` needs, in the order of NEEDS. KeyError for one that does not exist."""
+    needs = {**NEEDS, **ROUNDING_DOWN} if floor else NEEDS
     needed: set[str] = set()
     waiting = list(ops)
     while waiting:
         op = waiting.pop()
         if op not in needed:
             needed.add(op)
-            waiting += NEEDS[op]
+            waiting += needs[op]
     return tuple(op for op in NEEDS if op in needed)

@@ -14,22 +14,25 @@ import numpy as np
 from cffi import FFI
 
 from kfgen.emit.render import macro
-from kfgen.fixed import arithmetic, tables
+from kfgen.fixed import tables
+from kfgen.fixed.arithmetic import Status
 from kfgen.fixed.routines import NEEDS, closure
+from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
 
-# routine -> its arguments: w an int64_t, i a raw int32_t, each other letter an int of its own range
+# routine -> its arguments: w an int64_t, h a positive one, i a raw int32_t, each other letter an int of its own range
 ARGUMENTS = {
     "narrow": "ws", "mul": "iis", "madd": "iiis", "add": "ii", "sub": "ii", "shift": "it", "div": "iit",
-    "reciprocal": "is", "sqrt": "it",
+    "reciprocal": "is", "sqrt": "it", "floor": "if", "wrap": "ih", "hypot": "ii", "sin": "iff", "cos": "iff",
+    "atan": "iff", "atan2": "iir", "exp": "iff", "log": "iff",
 }  # fmt: skip
-C_TYPES = {"w": "int64_t", "i": "int32_t"}
-RANGES = {"s": (0, 62), "t": (-62, 62), "f": (0, 31)}
+C_TYPES = {"w": "int64_t", "h": "int64_t", "i": "int32_t"}
+RANGES = {"s": (0, 62), "t": (-62, 62), "f": (0, 31), "r": (0, 29)}
 HEAD = "#include <stdbool.h>\n#include <stdint.h>\n#define SATURATED UINT32_C(0x20)\n"
 
 
 def source(ops: Iterable[str] = ARGUMENTS, floor: bool = False) -> str:
     """The static functions, prefix `t`."""
-    return HEAD + macro("helpers_q.j2", "routines", "t", closure(ops), tables, "SATURATED", floor=floor)
+    return HEAD + macro("helpers_q.j2", "routines", "t", closure(ops, floor), tables, "SATURATED", floor=floor)
 
 
 def callers() -> str:
@@ -42,7 +45,8 @@ def callers() -> str:
         out += [f"void call_{op}(int n, {taken}, int32_t *result, uint32_t *status);"]
         out += [f"void call_{op}(int n, {taken}, int32_t *result, uint32_t *status)", "{"]
         out += ["    for (int i = 0; i < n; i++) {", "        status[i] = 1;"]
-        out += [f"        result[i] = t_q_{op}({given}, &status[i]);", "    }", "}"]
+        given += "" if op in WITHOUT_STATUS else ", &status[i]"
+        out += [f"        result[i] = t_q_{op}({given});", "    }", "}"]
     return "\n".join(out)
 
 
@@ -58,7 +62,7 @@ class Routines:
         """Results and statuses for columns of arguments."""
         n = len(columns[0])
         letters = ARGUMENTS[op]
-        types = [{"w": np.int64, "i": np.int32}.get(letter, np.intc) for letter in letters]
+        types = [{"w": np.int64, "h": np.int64, "i": np.int32}.get(letter, np.intc) for letter in letters]
         arrays: list[Any] = [np.array(c, dtype=t) for c, t in zip(columns, types, strict=True)]
         result, status = np.zeros(n, np.int32), np.zeros(n, np.uint32)
         names = [C_TYPES.get(letter, "int") for letter in letters]
@@ -70,11 +74,12 @@ class Routines:
 
 def expected(op: str, *columns: Sequence[int], **options: Any) -> tuple[list[int], list[int]]:
     """The same, by the Python routines."""
-    function = getattr(arithmetic, op)
+    function = TWINS[op]
     results, statuses = [], []
     for arguments in zip(*columns, strict=True):
-        status = arithmetic.Status()
-        results.append(function(*arguments, status, **options))
+        status = Status()
+        flags = () if op in WITHOUT_STATUS else (status,)
+        results.append(function(*arguments, *flags, **options))
         statuses.append(status.bits | 1)
     return results, statuses
 

@@ -19,6 +19,8 @@ def number(source: random.Random, letter: str) -> int:
     """Of the kind that ARGUMENTS names; sizes of all orders, extremes and neighbours of powers of two often."""
     if letter in RANGES:
         return source.randint(*RANGES[letter])
+    if letter == "h":
+        return source.randrange(2**32, 2**63) >> source.randrange(32) | 2**32
     bits = 64 if letter == "w" else 32
     kind = source.random()
     if kind < 0.15:
@@ -55,4 +57,4 @@ def test_needs_are_in_the_order_of_definition():
     for op, needs in NEEDS.items():
         assert set(needs) <= seen, op
         seen.add(op)
-    assert closure(["narrow"]) == ("sar", "limit", "round", "clamp", "narrow")
+    assert closure(["narrow"]) == ("sar", "limit", "round", "clamp", "scale", "narrow")
