@@ -123,7 +123,7 @@ class Printer:
         op = node.op
         if op.startswith("q_"):
             self.helpers.add(op)
-            args += [str(d) for d in node.data or ()]
+            args += [str(d) if abs(d) < 2**31 else f"INT64_C({d})" for d in node.data or ()]
             args += [] if op in self.scalar.silent_ops else [self.status]
             return f"{self.prefix}_{op}({', '.join(args)})"
         if op.startswith("table_"):

@@ -144,7 +144,7 @@ class FixedPoint:
     units: tuple[tuple[str, int], ...]
     table: tuple[str, ...]
     floor: bool
-    closure: Callable[[Iterable[str]], tuple[str, ...]]
+    closure: Callable[[Iterable[str], bool], tuple[str, ...]]
     tables: object
 
 
@@ -245,9 +245,8 @@ class _ViewMaker:
             return None
         used = {op.removeprefix("q_") for op in self.helpers if op.startswith("q_")}
         used |= {"product", "round"} if used & {"fma", "far", "mac"} else set()
-        used |= {"limit"} if used & {"fit", "abs"} else set()
         own = tuple(sorted(used & OWN))
-        return Routines(self.fixed.closure(used - OWN), own, self.fixed.tables, self.fixed.floor)
+        return Routines(self.fixed.closure(used - OWN, self.fixed.floor), own, self.fixed.tables, self.fixed.floor)
 
     # header ------------------------------------------------------------------------------------------
 
@@ -412,7 +411,7 @@ def may_saturate(f: Function) -> bool:
         stack = list(roots(s))
         while stack:
             node = stack.pop()
-            if node.op.startswith("q_") and node.op not in ("q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far"):
+            if node.op.startswith("q_") and node.op not in ("q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far", "q_abs"):
                 return True
             stack += node.args
     return False

@@ -20,8 +20,8 @@ from kfgen.fixed.unroll import unrolled
 from kfgen.fixed.weather import Weather
 from kfgen.logs import Log
 
-RUNS = ((1, 1.0, 0.0, 0.0), (2, 1.0, 0.0, 0.5), (3, 2.0, 0.02, -0.5))
-"""Seed, factor of the noises, share of outliers, correlation of the states that is given now and then."""
+RUNS = ((1.0, 0.0, 0.0), (1.0, 0.0, 0.5), (2.0, 0.02, -0.5), (1.0, 0.05, 0.0))
+"""Factor of the noises, share of outliers, correlation of the states that is given now and then."""
 STEPS = 300
 
 
@@ -46,14 +46,31 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     if log is not None:
         runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
     weather = Weather(code.model)
-    for seed, gain, outliers, correlation in RUNS:
-        runner.run(*weather.log(STEPS, Random(seed, gain, outliers)), correlation)
+    for seed, (gain, outliers, correlation) in enumerate(RUNS, 1):
+        log_, rows = weather.log(STEPS, Random(seed, gain), Random(100 + seed, gain, outliers))
+        runner.run(log_, rows, correlation)
     scale = None if spec.fixed.scale is None else _exponents(code)
-    formats = choose(real, arrays, ranges, scalar.bits, scale)
+    formats = choose(real, arrays, ranges, scalar.bits, scale, linear(code))
     lowered = lower(real, formats)
     view = FixedPoint(scalar.bits, _units(lowered.code, formats), _table(formats), scalar.rounding == "floor", closure,
                       tables)  # fmt: skip
     return FixedFilter(lowered.code, real, formats, lowered.tallies, view)
+
+
+def linear(code: FilterCode) -> bool:
+    """Whether the covariance is the same whatever is measured: a linear model of constant coefficients."""
+    model = code.model
+    options = model.options
+    if options.influence is not None or options.inflation is not None or model.spec.filter.type != "kf":
+        moving = {*model.symbols} - {"dt"}
+        for e in (*model.f, *(h for s in model.sensors for h in s.h)):
+            for _, slope in model.partials(e):
+                if {s.name for s in slope.free_symbols} & {name for name in moving}:
+                    return False
+        noisy = [e for row in model.Q for e in row] + [e for s in model.sensors for row in s.R for e in row]
+        if any(e.free_symbols for e in noisy) or options.influence is not None or options.inflation is not None:
+            return False
+    return model.dt is not None and options.adapt_R is None and options.adapt_Q is None and not model.definitions
 
 
 def _exponents(code: FilterCode) -> dict[str, int]:

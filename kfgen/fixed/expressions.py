@@ -23,6 +23,7 @@ LEAST = -(2**31)
 DYNAMIC = 1024  # a reciprocal whose runs span more than this is made with each quotient
 FIRST = 17  # the least shift of a product that has been proved to fit
 ROOMIER = 3  # bits that a product may lose so that it is proved to fit
+UNSEEN = 4  # bits for a choice that no run has made
 LAST = 32  # the largest for which one form of it does
 USEFUL = 20  # bits: a product of two full factors has no use for more than 62 less these
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
@@ -202,6 +203,12 @@ class Expressions:
             raw = replace(raw, low=0)
         return raw if e is None else self.at(raw, e)
 
+    def seen(self, node: Node) -> bool:
+        """Whether the runs have told the range of a value."""
+        if node.op in ("element", "field", "read", "variable", "const"):
+            return True
+        return self.natural(node) is not None
+
     def natural(self, node: Node) -> int | None:
         return self.c.formats.node(node)
 
@@ -298,9 +305,11 @@ class Expressions:
             return self.value(node.args[1] if condition.constant else node.args[2], e)
         if e is None:
             e = self.natural(node)
-            live = [self.value(n).e for n in node.args[1:] if n.constant is None]
+            live = [self.value(n).e for n in node.args[1:] if n.constant is None and self.seen(n)]
             if e is not None and live:
                 e = max(e, min(live))
+            if e is not None and not all(map(self.seen, node.args[1:])):
+                e += UNSEEN
         a, b = (self.value(n, e) for n in node.args[1:])
         if e is None:
             e = max(a.e, b.e) if a.size and b.size else (a.e if a.size else b.e)
@@ -531,6 +540,13 @@ class Expressions:
                 e = max(e, self.value(b).e + size_of(a.constant) - 4)
         return self._product(a, b, e)
 
+    def useful(self, node: Node, e: int | None) -> int | None:
+        """No finer than what one LSB of either factor makes."""
+        a, b = node.args
+        if e is None or a.constant is not None or b.constant is not None or self._inverse_of(a) or self._inverse_of(b):
+            return e
+        return max(e, self.value(a).e + self.value(b).e + USEFUL)
+
     def roomier(self, node: Node, e: int | None) -> int | None:
         """An exponent a little coarser at which a product is proved to fit, if there is one."""
         a, b = node.args
@@ -672,7 +688,10 @@ class Expressions:
         if raw is not None and raw > 0 and (int(raw) & (int(raw) - 1)) == 0:
             bits = s + int(raw).bit_length() - 1
             if 0 <= bits <= 62:
-                return Raw(make("q_reciprocal", (b.node,), (bits,)), e)
+                node = make("q_reciprocal", (b.node,), (bits,))
+                if b.low > 0:
+                    return Raw(node, e, 0, min(LIMIT, (1 << bits) // b.low + 1))
+                return Raw(node, e, -LIMIT if b.low < 0 else 0)
         if s > 62:
             a = self.at(a, a.e - (s - 62))
             s = 62
@@ -691,7 +710,7 @@ class Expressions:
             case "sqrt":
                 return self.root(node, e)
             case "abs":
-                a = self.value(node.args[0], e)
+                a = self.fit(self.value(node.args[0], e))
                 return Raw(make("q_abs", (a.node,)), a.e, 0, LIMIT)
             case "min" | "max":
                 a, b = (self.value(n, e) for n in node.args)
@@ -704,13 +723,15 @@ class Expressions:
                 return Raw(make("q_sign", (a.node,)), 0, -1, 1)
             case "wrap":
                 a = self.value(node.args[0])
-                period = nearest(node.data, a.e)
-                return Raw(make("q_wrap", (a.node, constant(period))), a.e, -(period // 2) - 1, period // 2 + 1)
+                half = nearest(node.data / 2, a.e - 32)
+                most = min(half >> 32, LIMIT)
+                return Raw(make("q_wrap", (a.node,), (half,)), a.e, -most, most)
             case "floor":
                 a = self.value(node.args[0])
                 if a.e >= 0:
                     return a
-                return Raw(make("q_floor", (a.node,), (-a.e,)), 0, LEAST >> min(-a.e, 40), LIMIT >> min(-a.e, 40))
+                a = self.at(a, max(a.e, -30))
+                return Raw(make("q_floor", (a.node,), (-a.e,)), a.e, max(a.low - (1 << -a.e), -LIMIT), a.high)
             case "table" | "slope":
                 return self.interpolated(node, e)
         if e is None:
@@ -724,6 +745,7 @@ class Expressions:
         out = min(max(e, -30), 0)
         self.c.tally.guarded += 1
         if op == "atan2":
+            out = max(out, -29)
             shared = max(a.e, b.e)
             return Raw(make("q_atan2", (self.at(a, shared).node, self.at(b, shared).node), (-out,)), out)
         if op == "pow":

@@ -19,6 +19,7 @@ BITS = 30  # of the size of a number inside: sums of two then fit an int32_t
 OUTSIDE = 31  # of one that the user reads or writes
 HEADROOM = 2  # bits above the largest value of the runs
 PASSING = 1  # the same for what is not kept
+MORE = 2  # further ones where gains depend on the data, so that no run shows their largest values
 SPARE = 1  # bits above a declared range
 SLACK = 1.02  # of a run's figures, so that the last digit of a platform's libm decides nothing
 
@@ -55,6 +56,7 @@ class Formats:
     arrays: Arrays
     ranges: Ranges
     bits: int  # n of q<m>.<n>
+    more: int = 0  # further head-room
     fixed: dict[Cell, int] = field(default_factory=dict)
     report: list[Quantity] = field(default_factory=list)
 
@@ -65,24 +67,28 @@ class Formats:
             largest = self.ranges.largest(cell)
             if largest == 0:
                 return None
-            found = self.fixed[cell] = exponent(largest, HEADROOM)
+            found = self.fixed[cell] = exponent(largest, HEADROOM + self.more)
         return found
 
     def node(self, node: Node, headroom: int = PASSING) -> int | None:
         """The exponent for the value of a node."""
         largest = self.ranges.largest(node)
-        return exponent(largest, headroom) if largest else None
+        return exponent(largest, headroom + self.more) if largest else None
 
 
     def least(self, node: Node) -> int | None:
         """The finest exponent at which the runs' values still fit, with a little to spare."""
         largest = self.ranges.largest(node)
-        return exponent(1.25 * largest, 0) if largest else None
+        return exponent(1.25 * largest, self.more) if largest else None
 
 
-def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, scale: Mapping[str, int] | None) -> Formats:
-    """The formats of the interface and of the covariance. scale: exponents of the states' units, where given."""
-    formats = Formats(arrays, ranges, bits)
+def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, scale: Mapping[str, int] | None,
+           linear: bool) -> Formats:  # fmt: skip
+    """The formats of the interface and of the covariance.
+
+    scale: exponents of the states' units, where given. linear: the covariance does not depend on the data.
+    """
+    formats = Formats(arrays, ranges, bits, 0 if linear else MORE)
     _Interface(code, formats, scale or {}).choose()
     return formats
 

@@ -237,7 +237,7 @@ class _Statements:
                 least = self.c.formats.node(node, 0)
                 e = None if least is not None and least > e else e
             if name not in self.ties and node.op == "mul":
-                e = self.x.roomier(node, e)
+                e = self.x.roomier(node, self.x.useful(node, e))
             raw = self.x.value(node, e)
             if not self.outside(name):
                 raw = self.x.fit(raw)

@@ -8,6 +8,7 @@ from typing import Any
 
 from kfgen.fixed import arithmetic
 from kfgen.fixed.arithmetic import Status
+from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
 
 PREFIX = "q_"
 INSIDE = 2**30 - 1
@@ -18,7 +19,9 @@ class Fixed:
 
     helpers = "helpers_q.j2"
     helper_ops = frozenset({"segment"})
-    silent_ops = frozenset({"q_min", "q_max", "q_sign", "q_atan2", "q_floor", "q_count", "q_fma", "q_far"})
+    silent_ops = frozenset({"q_abs", "q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far"}) | {
+        f"q_{name}" for name in WITHOUT_STATUS
+    }
     c_type = "int32_t"
     size = 4
     epsilon = Fraction(1, 2**26)
@@ -60,10 +63,10 @@ class Fixed:
                 return _OPERATIONS[op](data, *args)
             given = [*args, *(data or ())]
             if name in _ROUNDED:
-                return getattr(arithmetic, name)(*given, self.status, self.rounding)
-            if op in self.silent_ops:
-                return getattr(arithmetic, name)(*given)
-            return getattr(arithmetic, name)(*given, self.status)
+                return TWINS[name](*given, self.status, self.rounding)
+            if name in WITHOUT_STATUS:
+                return TWINS[name](*given)
+            return TWINS[name](*given, self.status)
         value = _OPERATIONS[op](data, *args)
         return value if isinstance(value, bool) else self._proved(value)
 
@@ -102,5 +105,6 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "q_min": lambda d, a, b: min(a, b),
     "q_max": lambda d, a, b: max(a, b),
     "q_sign": lambda d, a: (a > 0) - (a < 0),
+    "q_abs": lambda d, a: abs(a),
     "q_count": lambda d, a: min(a, 2**31 - 1),
 }

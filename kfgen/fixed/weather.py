@@ -60,8 +60,11 @@ class Weather:
                 t.store("out.R", i * m + j, t.value(R[i][j]))
         return Function(f"see_{k}", [], schedule(t), "", returns="void")
 
-    def log(self, rows: int, random: Random) -> tuple[dict[str, list[float]], int]:
-        """Columns, and how many rows there are: fewer than asked for where the model leaves the numbers."""
+    def log(self, rows: int, random: Random, reading: Random) -> tuple[dict[str, list[float]], int]:
+        """Columns, and how many rows there are: fewer than asked for where the model leaves the numbers.
+
+        random: for the truth; reading: for the noise of the sensors.
+        """
         model, n = self.model, self.n
         memory = Memory({"kf.x": [], "out.x": [0.0] * n, "out.Q": [0.0] * n * n}, {"kf.steps": 0, "kf.t": 0.0})
         x = [float(v) for v in model.x0]
@@ -99,7 +102,7 @@ class Weather:
                 memory.arrays["out.z"], memory.arrays["out.R"] = [0.0] * m, [0.0] * (m * m)
                 self.program.run(f"see_{i}", memory)
                 flat = memory.arrays["out.R"]
-                noise = draw([flat[r * m : r * m + m] for r in range(m)], random)
+                noise = draw([flat[r * m : r * m + m] for r in range(m)], reading)
                 for name, z, e, period in zip(self._names(sensor), memory.arrays["out.z"], noise, sensor.periods,
                                               strict=True):  # fmt: skip
                     z += e
