@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from kfgen.emit.view import FixedPoint
+from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed import tables
 from kfgen.fixed.cells import find_arrays
 from kfgen.fixed.expressions import Tally, size_of
 from kfgen.fixed.formats import Formats, choose
 from kfgen.fixed.lowering import lower
+from kfgen.fixed.probe import probe
 from kfgen.fixed.random import Random
 from kfgen.fixed.real import Ranges, RealProgram
 from kfgen.fixed.routines import closure
@@ -23,6 +26,8 @@ from kfgen.logs import Log
 RUNS = ((1.0, 0.0, 0.0), (1.0, 0.0, 0.5), (2.0, 0.02, -0.5), (1.0, 0.05, 0.0))
 """Factor of the noises, share of outliers, correlation of the states that is given now and then."""
 STEPS = 300
+PROBED = 120  # rows that the integers are tried on
+FAILING = 0.25  # standard deviations by which they may be off
 
 
 @dataclass(frozen=True)
@@ -52,9 +57,35 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     scale = None if spec.fixed.scale is None else _exponents(code)
     formats = choose(real, arrays, ranges, scalar.bits, scale, linear(code))
     lowered = lower(real, formats)
+    _judge(runner.program, real, lowered.code, formats, scalar, weather)
     view = FixedPoint(scalar.bits, _units(lowered.code, formats), _table(formats), scalar.rounding == "floor", closure,
                       tables)  # fmt: skip
     return FixedFilter(lowered.code, real, formats, lowered.tallies, view)
+
+
+def _judge(program: RealProgram, real: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed,
+           weather: Weather) -> None:  # fmt: skip
+    """SpecError where the integers do not follow the real numbers."""
+    log, rows = weather.log(PROBED, Random(11), Random(111))
+    found = probe(program, real, integer, formats, scalar, log, rows)
+    if found.sigmas <= FAILING and not found.errors:
+        return
+    state = real.model.spec.states[found.state]
+    bits = max(1, math.ceil(math.log2(min(found.sigmas, 1e9) / FAILING))) if found.sigmas > FAILING else 1
+    largest, least = _spread(formats, found.state, len(real.model.states))
+    what = f"{scalar.name} cannot carry `{state.name}`"
+    if least > 0:
+        what += f": its standard deviation goes from {largest:.3g} to {least:.3g}"
+    raise SpecError.at(
+        state.place, f"{what}; {bits} bit{'s' * (bits > 1)} are missing",
+        "start with a smaller std, declare a range, try covariance: sqrt, or use float",
+    )  # fmt: skip
+
+
+def _spread(formats: Formats, i: int, n: int) -> tuple[float, float]:
+    """The largest and the smallest standard deviation of a state that the runs have met."""
+    cell = formats.arrays.element(("array", "get_covariance", "P"), i * n + i)
+    return math.sqrt(formats.ranges.largest(cell)), math.sqrt(formats.ranges.smallest(cell))
 
 
 def linear(code: FilterCode) -> bool:

@@ -69,14 +69,16 @@ class Memory:
 class RealProgram:
     """The functions of a filter, to be run on a Memory."""
 
-    def __init__(self, functions: list[Function], arrays: Arrays, ranges: Ranges) -> None:
+    def __init__(self, functions: list[Function], arrays: Arrays, ranges: Ranges,
+                 source: type[Source] | None = None, scope: dict[str, Any] | None = None) -> None:  # fmt: skip
         self.ranges = ranges
         self.arrays = arrays
         self._scope: dict[str, Any] = {
             **_FUNCTIONS, "H": ranges.high, "L": ranges.low, "S": ranges.small, "BIG": HUGE, "inf": math.inf,
+            **(scope or {}),
         }  # fmt: skip
         for f in functions:
-            text = _Source(f, self).text()
+            text = (source or Source)(f, self).text()
             exec(compile(text, f"<{f.name}>", "exec"), self._scope)  # noqa: S102 - our own text, see above
 
     def table(self, table: Table) -> str:
@@ -91,10 +93,14 @@ class RealProgram:
         self._scope[f"{name}_d"] = [float(v) for v in table.slopes()]
         return name
 
-    def constants(self, numbers: tuple[Any, ...]) -> str:
-        name = f"lookup_{len(self._scope)}"
-        self._scope[name] = [float(v) for v in numbers]
+    def bound(self, value: object) -> str:
+        """A name for an object, as the source may use it."""
+        name = f"bound_{len(self._scope)}"
+        self._scope[name] = value
         return name
+
+    def constants(self, numbers: tuple[Any, ...]) -> str:
+        return self.bound([float(v) for v in numbers])
 
     def run(self, function: str, memory: Memory) -> str:
         """Run a function; the name of the status with which it ended."""
@@ -102,7 +108,9 @@ class RealProgram:
         return result
 
 
-class _Source:
+class Source:
+    """Writes one function; a subclass may say otherwise how numbers are computed."""
+
     def __init__(self, function: Function, program: RealProgram) -> None:
         self.f = function
         self.program = program
@@ -230,7 +238,7 @@ class _Source:
         self.emit(f"{self.place(s.name, s.index)} = {v}")
         if s.node.kind == "real":
             v = self.new(v) if not v.isidentifier() else v
-            self.record(self.cell(s.name, s.index), v)
+            self.record(self.cell(s.name, s.index), v, small=s.name == "P")
 
     def cell(self, name: str, index: Node) -> Cell:
         from kfgen.fixed.cells import affine
