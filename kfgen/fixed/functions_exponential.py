@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from kfgen.fixed import tables
-from kfgen.fixed.arithmetic import LIMIT, Status, narrow
+from kfgen.fixed.arithmetic import LIMIT, Status, narrow, scale
+from kfgen.fixed.functions_circular import inverse
 
 
 def power(x: int) -> tuple[int, int]:
@@ -23,16 +24,23 @@ def power(x: int) -> tuple[int, int]:
     return 2**61 + (t << 29) + (e + (e * t >> 32) << 25), n >> 4
 
 
+def scaled(m: int, s: int, status: Status) -> int:
+    """m / 2^s, m >= 2^61, s of any size."""
+    if s < 31:
+        status.saturate()
+        return LIMIT
+    return narrow(m, s, status) if s < 64 else 0
+
+
 def exp(a: int, fa: int, fr: int, status: Status) -> int:
     whole = a >> fa
     if whole < -31:
         return 0
-    mantissa, exponent = power(a << (58 - fa)) if whole < 31 else (0, 64)
-    s = 61 - exponent - fr
-    if s < 31:
+    if whole > 30:
         status.saturate()
         return LIMIT
-    return narrow(mantissa, s, status) if s < 64 else 0
+    mantissa, exponent = power(a << (58 - fa))
+    return scaled(mantissa, 61 - fr - exponent, status)
 
 
 def logarithm(m: int) -> tuple[int, int]:
@@ -56,3 +64,72 @@ def log(a: int, fa: int, fr: int, status: Status) -> int:
     z = 32 - a.bit_length()
     value, upper = logarithm(a << z)
     return narrow((31 - z - fa + upper) * tables.ln2(58) + (value >> 4), 58 - fr, status)
+
+
+def sinh(a: int, fa: int, fr: int, status: Status) -> int:
+    value = _hyperbolic(a, fa, fr, -1, status)
+    return -value if a < 0 else value
+
+
+def cosh(a: int, fa: int, fr: int, status: Status) -> int:
+    return _hyperbolic(a, fa, fr, 1, status)
+
+
+def _hyperbolic(a: int, fa: int, fr: int, sign: int, status: Status) -> int:
+    # of |a|: a negative sine must be rounded as the C does, from its own side
+    size = abs(a)
+    if size >> fa > 22:
+        status.saturate()
+        return LIMIT
+    (grown, up), (shrunk, down) = power(size << (58 - fa)), power(-(size << (58 - fa)))
+    twice = grown + sign * (shrunk >> (up - down))
+    s = 62 - fr - up
+    if s < 0:
+        status.saturate()
+        return LIMIT
+    return -narrow(-twice, s, status) if a < 0 and sign < 0 else narrow(twice, s, status)
+
+
+def tanh(a: int, fa: int, fr: int, status: Status) -> int:
+    size, part = abs(a), 0
+    if size == 0:
+        return 0
+    if size >> fa < 12:
+        mantissa, exponent = power(-(size << (59 - fa)))
+        part = scale(mantissa, 29 - exponent)
+    ratio = 2**33
+    if part:
+        n = 2**32 - part
+        ratio = n + (inverse((2**32 + part) >> 1) * n >> 32)
+    return narrow(-ratio if a < 0 else ratio, 33 - fr, status)
+
+
+def pow(a: int, fa: int, b: int, fb: int, fr: int, status: Status) -> int:
+    if b == 0:
+        return narrow(2**31, 31 - fr, status)
+    if a == 0:
+        if b > 0:
+            return 0
+        status.saturate()
+        return LIMIT
+    if a < 0 and abs(b) % (1 << fb):
+        status.saturate()
+        return 0
+    z = 32 - abs(a).bit_length()
+    log, upper = logarithm(abs(a) << z)
+    n = 31 - z - fa + upper
+    s = fb + 4 if n == 0 else fb
+    if n:
+        log = n * tables.ln2(58) + (log >> 4)
+    size = abs(b) * abs(log)
+    shrinks = (log < 0) != (b < 0)
+    if size >> (63 + s):
+        value = 0
+        if not shrinks:
+            status.saturate()
+            value = LIMIT
+    else:
+        x = size >> s
+        mantissa, exponent = power(-x if shrinks else x)
+        value = scaled(mantissa, 61 - fr - exponent, status)
+    return -value if a < 0 and abs(b) >> fb & 1 else value

@@ -25,8 +25,15 @@ TWINS: dict[str, Callable[..., int]] = {
     "cos": circular.cos,
     "atan": circular.atan,
     "atan2": circular.atan2,
+    "tan": circular.tan,
+    "asin": circular.asin,
+    "acos": circular.acos,
     "exp": exponential.exp,
     "log": exponential.log,
+    "sinh": exponential.sinh,
+    "cosh": exponential.cosh,
+    "tanh": exponential.tanh,
+    "pow": exponential.pow,
 }
 """name -> function; the arguments are those of the C routine, `status` last where it has one."""
 WITHOUT_STATUS = frozenset({"floor", "atan2"})

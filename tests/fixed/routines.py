@@ -23,10 +23,11 @@ from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
 ARGUMENTS = {
     "narrow": "ws", "mul": "iis", "madd": "iiis", "add": "ii", "sub": "ii", "shift": "it", "div": "iit",
     "reciprocal": "is", "sqrt": "it", "floor": "if", "wrap": "ih", "hypot": "ii", "sin": "iff", "cos": "iff",
-    "atan": "iff", "atan2": "iir", "exp": "iff", "log": "iff",
+    "atan": "iff", "atan2": "iir", "exp": "iff", "log": "iff", "tan": "ifg",
+    "asin": "ifg", "acos": "ifg", "sinh": "ifg", "cosh": "ifg", "tanh": "ifg", "pow": "ififg",
 }  # fmt: skip
 C_TYPES = {"w": "int64_t", "h": "int64_t", "i": "int32_t"}
-RANGES = {"s": (0, 62), "t": (-62, 62), "f": (0, 31), "r": (0, 29)}
+RANGES = {"s": (0, 62), "t": (-62, 62), "f": (0, 31), "g": (0, 30), "r": (0, 29)}
 HEAD = "#include <stdbool.h>\n#include <stdint.h>\n#define SATURATED UINT32_C(0x20)\n"
 
 
