@@ -312,8 +312,10 @@ class Expressions:
                 e += UNSEEN
         a, b = (self.value(n, e) for n in node.args[1:])
         if e is None:
-            e = max(a.e, b.e) if a.size and b.size else (a.e if a.size else b.e)
-            a, b = self.at(a, e), self.at(b, e)
+            fitting = [size_of(n.constant) - BITS if n.constant else r.e
+                       for n, r in zip(node.args[1:], (a, b), strict=True) if n.constant != 0]  # fmt: skip
+            e = max(fitting, default=0)
+            a, b = (self.value(n, e) for n in node.args[1:])
         return Raw(make("select", (condition, a.node, b.node)), e, min(a.low, b.low), max(a.high, b.high))
 
     def negative(self, a: Raw) -> Raw:
@@ -339,7 +341,7 @@ class Expressions:
 
     def sum(self, node: Node, e: int | None) -> Raw:
         terms = self.terms(node)
-        needed = self.natural(node)
+        needed = self.natural(node) if e is not None else self.useful(node, None)
         if needed is None:
             needed = e if e is not None else max(self._guess(f) for _, f in terms)
         least = needed - 2 if e is not None else needed  # a store's own head-room is enough
@@ -541,11 +543,37 @@ class Expressions:
         return self._product(a, b, e)
 
     def useful(self, node: Node, e: int | None) -> int | None:
-        """No finer than what one LSB of either factor makes."""
-        a, b = node.args
-        if e is None or a.constant is not None or b.constant is not None or self._inverse_of(a) or self._inverse_of(b):
-            return e
-        return max(e, self.value(a).e + self.value(b).e + USEFUL)
+        """No finer than the digits that the operands have: what is zero but for round-off has no range of its own."""
+        e = self.natural(node) if e is None else e
+        floor_ = self.digits(node)
+        return e if e is None or floor_ is None else max(e, floor_)
+
+    def digits(self, node: Node) -> int | None:
+        """The finest exponent that has a use for the value of an expression; None where it may be any."""
+        match node.op:
+            case "const":
+                return None
+            case "neg":
+                return self.digits(node.args[0])
+            case "mul":
+                a, b = node.args
+                if b.constant is not None:
+                    a, b = b, a
+                if self._inverse_of(a) or self._inverse_of(b):
+                    return None
+                if a.constant is not None:
+                    inner = self.digits(b)
+                    return None if inner is None or a.constant == 0 else inner + size_of(a.constant) - 4
+                return self.value(a).e + self.value(b).e + USEFUL
+            case "sum" | "add" | "sub":
+                found = []
+                for _, f in self.terms(node):
+                    if f[0].constant is None or len(f) == 2:
+                        found.append(self.digits(f[0] if len(f) == 1 else make("mul", f)))
+                return None if not found or None in found else min(v for v in found if v is not None)
+            case "variable" if node.data in self.c.inverses:
+                return None
+        return self.value(node).e
 
     def roomier(self, node: Node, e: int | None) -> int | None:
         """An exponent a little coarser at which a product is proved to fit, if there is one."""
@@ -553,7 +581,8 @@ class Expressions:
         natural = self.natural(node)
         if natural is None or self._inverse_of(a) or self._inverse_of(b):
             return e
-        e = natural if e is None else e
+        if e is None:
+            return None
         raws = [self.value(f) for f in (a, b) if f.constant is None]
         bound = Fraction(1)
         for raw in raws:

@@ -236,8 +236,10 @@ class _Statements:
             if e is not None and name in self.ties:
                 least = self.c.formats.node(node, 0)
                 e = None if least is not None and least > e else e
+            if name not in self.ties and node.op in ("mul", "sum"):
+                e = self.x.useful(node, e)
             if name not in self.ties and node.op == "mul":
-                e = self.x.roomier(node, self.x.useful(node, e))
+                e = self.x.roomier(node, e)
             raw = self.x.value(node, e)
             if not self.outside(name):
                 raw = self.x.fit(raw)
