@@ -23,9 +23,10 @@ from kfgen.fixed.unroll import unrolled
 from kfgen.fixed.weather import Weather
 from kfgen.logs import Log
 
-RUNS = ((1.0, 0.0, 0.0), (1.0, 0.0, 0.5), (2.0, 0.02, -0.5), (1.0, 0.05, 0.0))
-"""Factor of the noises, share of outliers, correlation of the states that is given now and then."""
+RUNS = ((1.0, 0.0, 0.0, 1), (1.0, 0.0, 0.5, 10), (2.0, 0.02, -0.5, 1), (1.0, 0.05, 0.0, 4))
+"""Factor of the noises, share of outliers, correlation of the states that is given now and then, rows per reading."""
 STEPS = 300
+LONG = 2000  # of a filter whose covariance does not depend on the data: to its steady state
 PROBED = 120  # rows that the integers are tried on
 FAILING = 0.25  # standard deviations by which they may be off
 
@@ -51,11 +52,13 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     if log is not None:
         runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
     weather = Weather(code.model)
-    for seed, (gain, outliers, correlation) in enumerate(RUNS, 1):
-        log_, rows = weather.log(STEPS, Random(seed, gain), Random(100 + seed, gain, outliers))
-        runner.run(log_, rows, correlation)
+    for seed, (gain, outliers, correlation, every) in enumerate(RUNS, 1):
+        steps = LONG if seed == 1 and linear(code) else STEPS
+        log_, rows = weather.log(steps, Random(seed, gain), Random(100 + seed, gain, outliers))
+        runner.run(log_, rows, correlation, every)
+    noise = weather.process_noise()
     scale = None if spec.fixed.scale is None else _exponents(code)
-    formats = choose(real, arrays, ranges, scalar.bits, scale, linear(code))
+    formats = choose(real, arrays, ranges, scalar.bits, scale, linear(code), noise)
     lowered = lower(real, formats)
     _judge(runner.program, real, lowered.code, formats, scalar, weather)
     view = FixedPoint(scalar.bits, _units(lowered.code, formats), _table(formats), scalar.rounding == "floor", closure,

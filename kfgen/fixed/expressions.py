@@ -685,6 +685,9 @@ class Expressions:
     # quotients -------------------------------------------------------------------------------------------
 
     def _inverse_of(self, node: Node) -> tuple[Raw, Node | None] | None:
+        if node.op == "div" and node.args[0].constant == 1 and self.c.formats.more:
+            den = self.value(node.args[1])
+            return (den, None) if den.low <= 0 else None
         return self.c.inverses.get(node.data) if node.op == "variable" else None
 
     def inverse(self, node: Node, e: int | None) -> Raw:

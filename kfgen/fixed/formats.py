@@ -21,6 +21,7 @@ HEADROOM = 2  # bits above the largest value of the runs
 PASSING = 1  # the same for what is not kept
 MORE = 2  # further ones where gains depend on the data, so that no run shows their largest values
 SPARE = 1  # bits above a declared range
+KEPT = 5  # bits of the process noise of a step
 SLACK = 1.02  # of a run's figures, so that the last digit of a platform's libm decides nothing
 
 
@@ -83,18 +84,20 @@ class Formats:
 
 
 def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, scale: Mapping[str, int] | None,
-           linear: bool) -> Formats:  # fmt: skip
+           linear: bool, noise: list[float]) -> Formats:  # fmt: skip
     """The formats of the interface and of the covariance.
 
     scale: exponents of the states' units, where given. linear: the covariance does not depend on the data.
+    noise: what a step adds to each variance (n,).
     """
     formats = Formats(arrays, ranges, bits, 0 if linear else MORE)
-    _Interface(code, formats, scale or {}).choose()
+    _Interface(code, formats, scale or {}, noise).choose()
     return formats
 
 
 class _Interface:
-    def __init__(self, code: FilterCode, formats: Formats, scale: Mapping[str, int]) -> None:
+    def __init__(self, code: FilterCode, formats: Formats, scale: Mapping[str, int], noise: list[float]) -> None:
+        self.noise = noise
         self.code = code
         self.f = formats
         self.model = code.model
@@ -153,8 +156,8 @@ class _Interface:
     def _quantity(self, cell: Cell, name: str, declared: float, headroom: int, least: int | None = None,
                   most: str = "") -> int:  # fmt: skip
         seen = self.f.ranges.largest(cell)
-        largest = max(declared, seen)
-        e = exponent(largest, headroom if declared < seen else SPARE, OUTSIDE) if largest else -self.f.bits
+        largest = declared or seen
+        e = exponent(largest, SPARE if declared else headroom, OUTSIDE) if largest else -self.f.bits
         raised = ""
         if least is not None and least > e:
             e, raised = least, most
@@ -197,6 +200,14 @@ class _Interface:
         """P_ij at the mean of P_ii and P_jj, which bound it."""
         f, n = self.f, len(self.model.states)
         fields = {block.name for block in self.code.blocks}
+        for j in range(n):  # head-room gives way to the process noise, which must not be rounded away
+            state = self.code.order[j]
+            index = j if "D" in fields else j * (j + 3) // 2
+            cell = f.arrays.element(("array", "kf.D" if "D" in fields else "kf.P"), index)
+            e, largest, noise = f.of(cell), f.ranges.largest(cell), self.noise[state]
+            if "S" not in fields and e is not None and noise > 0:
+                wanted = math.frexp(noise)[1] - 1 - KEPT
+                f.fixed[cell] = max(min(e, wanted), exponent(1.05 * largest, 0))
         if "P" not in fields:
             return
         diagonal = []

@@ -266,9 +266,12 @@ class _Statements:
             return None
         ranges = self.c.formats.ranges
         largest, smallest = ranges.largest(node), ranges.smallest(node)
-        if largest == 0 or largest <= DYNAMIC * smallest:
-            return None
         if node.args[0].constant != 1:
+            return None
+        if self.c.formats.more:  # the runs may not have met the smallest divisor
+            if self.x.value(node.args[1]).low > 0 and largest <= DYNAMIC * smallest:
+                return None
+        elif largest == 0 or largest <= DYNAMIC * smallest:
             return None
         test = None if condition is None else self.x.index(condition)
         out: list[Statement] = []

@@ -11,6 +11,7 @@ from kfgen.fixed.real import Memory, Ranges, RealProgram
 
 Columns = Mapping[str, Sequence[float]]
 CORRELATED = 75  # rows between two covariances that are given
+OUTAGE = 60  # rows without any reading
 EVERY = 16  # rows between two calls of the functions that a run does not need
 
 
@@ -47,11 +48,12 @@ class Runner:
         self.statuses[status] = self.statuses.get(status, 0) + 1
         return status
 
-    def run(self, log: Columns, rows: int, correlation: float = 0.0) -> Memory:
+    def run(self, log: Columns, rows: int, correlation: float = 0.0, every: int = 1) -> Memory:
         """A whole log, as `kfgen run` would: predict, then the updates in the spec's order.
 
         correlation: the states are given this one now and then, so that no part of a covariance is taken for zero
-        only because the first one is diagonal.
+        only because the first one is diagonal. every: rows from one reading of a sensor to the next; beyond 1 there
+        is a gap of OUTAGE rows as well.
         """
         memory = blank(self.code)
         self.call("init", memory)
@@ -63,8 +65,9 @@ class Runner:
             if self._step(memory, log, k):
                 self.call("predict", memory)
                 self._look(memory)
-            for sensor in self.spec.measurements:
-                self._update(memory, sensor, log, k)
+            for place, sensor in enumerate(self.spec.measurements):
+                if every == 1 or ((k + place) % every == 0 and not rows < 2 * k < rows + 2 * OUTAGE):
+                    self._update(memory, sensor, log, k)
             if k % EVERY == 0 or k == rows - 1:
                 self._others(memory, k)
         return memory

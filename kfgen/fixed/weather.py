@@ -34,6 +34,8 @@ class Weather:
         self.run_time = model.spec.dt is not None and model.spec.dt.run_time
         functions = [self._step(), *(self._sensor(k) for k in range(len(model.sensors)))]
         self.program = RealProgram(functions, find_arrays(functions), Ranges())
+        self.limits = [self._limits(i) for i in range(self.n)]
+        self.last = [0.0] * self.n**2  # Q of the last step
 
     def _step(self) -> Function:
         t, model, n = Trace(), self.model, self.n
@@ -86,7 +88,7 @@ class Weather:
                 memory.numbers["dt"] = dt
                 self.program.run("step", memory)
                 after = list(memory.arrays["out.x"])
-                flat = memory.arrays["out.Q"]
+                self.last = flat = memory.arrays["out.Q"]
                 noise = draw([flat[i * n : i * n + n] for i in range(n)], random)
                 if not all(abs(a) < HUGE for a in after):
                     return columns, k
@@ -109,17 +111,30 @@ class Weather:
                     columns[name].append(z if period is None else math.remainder(z, float(period)))
         return columns, rows
 
+    def process_noise(self) -> list[float]:
+        """The variance that a step adds to each state (n,), at the initial state."""
+        self.log(1 + self.run_time, Random(1), Random(2))
+        return [max(self.last[i * self.n + i], 0.0) for i in range(self.n)]
+
     def _names(self, sensor: object) -> list[str]:
         return [f"{sensor.name}.{c.name}" for c in sensor.spec.components]  # type: ignore[attr-defined]
 
     def _place(self, memory: Memory, x: Sequence[float], noise: Sequence[float]) -> None:
         placed = []
-        for a, e, bounds, period in zip(x, noise, self.model.bounds, self.model.periods, strict=True):
-            v = a + e
-            if bounds is not None:
-                v = min(max(v, float(bounds[0])), float(bounds[1]))
+        for a, e, limits, period in zip(x, noise, self.limits, self.model.periods, strict=True):
+            v = a + e if limits is None else min(max(a + e, limits[0]), limits[1])
             placed.append(v if period is None else math.remainder(v, float(period)))
         memory.arrays["kf.x"] = placed
+
+    def _limits(self, i: int) -> tuple[float, float] | None:
+        """What a state stays within: its bounds, or the range that it is declared to have."""
+        bounds, declared = self.model.bounds[i], self.spec.states[i].range
+        if bounds is not None:
+            return float(bounds[0]), float(bounds[1])
+        if declared is None:
+            return None
+        low, high = (float(value(limit.tree, self.spec)) for limit in declared)
+        return low, high
 
     def _clamped(self, dt: float) -> float:
         low, high = self.model.dt_limits
