@@ -33,6 +33,7 @@ STATUSES = (
     ("NOT_POSITIVE", 0x400, "a variance or dt is not positive"),
 )
 
+_QUIET = frozenset({"q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far", "q_abs"})
 OWN = frozenset({"abs", "min", "max", "sign", "count", "fma", "far", "fit", "mac"})
 """Routines of fixed point that stand in the template of the lowered program."""
 
@@ -195,7 +196,8 @@ class _ViewMaker:
             sha256=spec.sha256,
             ram=self.ram(),
             scalar=ScalarView(
-                scalar.name, None if self.fixed is None else self.fixed.fraction_bits, scalar.c_type, scalar.helpers, scalar.literal(Fraction(0)), scalar.literal(Fraction(1)),
+                scalar.name, None if self.fixed is None else self.fixed.fraction_bits, scalar.c_type,
+                scalar.helpers, scalar.literal(Fraction(0)), scalar.literal(Fraction(1)),
                 scalar.function("ceil"),
             ),
             states=self.aligned([
@@ -230,7 +232,8 @@ class _ViewMaker:
             helpers=tuple(sorted(self.helpers)),
             units=self.units(),
             routines=self.routines(),
-            uses_math=self.fixed is None and (bool(self.helpers & {"wrap"}) or any(f"{f}(" in text for f in LIBRARY_NAMES)),
+            uses_math=self.fixed is None
+            and (bool(self.helpers & {"wrap"}) or any(f"{f}(" in text for f in LIBRARY_NAMES)),
         )  # fmt: skip
 
     # fixed point ---------------------------------------------------------------------------------------
@@ -411,7 +414,7 @@ def may_saturate(f: Function) -> bool:
         stack = list(roots(s))
         while stack:
             node = stack.pop()
-            if node.op.startswith("q_") and node.op not in ("q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far", "q_abs"):
+            if node.op.startswith("q_") and node.op not in _QUIET:
                 return True
             stack += node.args
     return False

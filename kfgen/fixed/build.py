@@ -99,7 +99,7 @@ def linear(code: FilterCode) -> bool:
         moving = {*model.symbols} - {"dt"}
         for e in (*model.f, *(h for s in model.sensors for h in s.h)):
             for _, slope in model.partials(e):
-                if {s.name for s in slope.free_symbols} & {name for name in moving}:
+                if {s.name for s in slope.free_symbols} & set(moving):
                     return False
         noisy = [e for row in model.Q for e in row] + [e for s in model.sensors for row in s.R for e in row]
         if any(e.free_symbols for e in noisy) or options.influence is not None or options.inflation is not None:

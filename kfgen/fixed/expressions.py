@@ -359,8 +359,8 @@ class Expressions:
         for sign, raw in whole:
             if (sign, raw) not in late:
                 total = self._plus(total, sign, raw, e)
-        for sign, f in products:
-            total = self._madd(total, sign, f, e)
+        for sign, factors in products:
+            total = self._madd(total, sign, factors, e)
         for sign, raw in late:
             total = self._plus(total, sign, raw, e)
         assert total is not None
@@ -395,7 +395,7 @@ class Expressions:
         low = total.low + (raw.low if sign > 0 else -raw.high)
         high = total.high + (raw.high if sign > 0 else -raw.low)
         op = "add" if sign > 0 else "sub"
-        if -LIMIT <= low and high <= LIMIT:
+        if low >= -LIMIT and high <= LIMIT:
             self.c.tally.proved += 1
             if total.node.op == "neg" and sign > 0:
                 return Raw(make("sub", (raw.node, total.node.args[0])), e, low, high)
@@ -430,7 +430,7 @@ class Expressions:
         low, high = self.span(ra, rb, s, most if sign > 0 else None)
         if self.small(ra) and self.small(rb) and s >= FIRST:
             for begin in (total, self.fit(total)):
-                if -LIMIT <= begin.low + low and begin.high + high <= LIMIT:
+                if begin.low + low >= -LIMIT and begin.high + high <= LIMIT:
                     self.c.tally.proved += 1
                     args = (begin.node, ra.node, rb.node)
                     node = make("q_fma" if s <= LAST else "q_far", args, (s,))
@@ -465,7 +465,7 @@ class Expressions:
     def _mul(self, a: Raw, b: Raw, s: int, e: int, most: int | None = None) -> Raw:
         low, high = self.span(a, b, s, most)
         args = (constant(0), a.node, b.node)
-        if self.small(a) and self.small(b) and s >= FIRST and -LIMIT <= low and high <= LIMIT:
+        if self.small(a) and self.small(b) and s >= FIRST and low >= -LIMIT and high <= LIMIT:
             self.c.tally.proved += 1
             clipped = make("q_mac", args, (s,)) if s <= LAST else None
             return Raw(make("q_fma" if s <= LAST else "q_far", args, (s,)), e, low, high, clipped)

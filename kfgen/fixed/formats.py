@@ -1,6 +1,6 @@
 """Binary points: the value of raw 1 of every cell is 2^e, with e from what runs, ranges and units say.
 
-Interface (fields that the user reads or writes): units from declared ranges, so that the range fits with a bit to
+Interface (fields that the user reads or writes): units from declared ranges, so that the range fits with bits to
 spare, or from the runs with more. Inside: from the largest value of the runs with HEADROOM bits above it.
 """
 
@@ -20,7 +20,7 @@ OUTSIDE = 31  # of one that the user reads or writes
 HEADROOM = 2  # bits above the largest value of the runs
 PASSING = 1  # the same for what is not kept
 MORE = 2  # further ones where gains depend on the data, so that no run shows their largest values
-SPARE = 1  # bits above a declared range
+SPARE = 3  # bits above a declared range, which a filter may overshoot
 KEPT = 5  # bits of the process noise of a step
 SLACK = 1.02  # of a run's figures, so that the last digit of a platform's libm decides nothing
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import cast
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.cells import Cell, affine, array_of, number_of
@@ -13,7 +14,22 @@ from kfgen.fixed.formats import BITS, Formats
 from kfgen.fixed.unroll import make
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
-    Argument, Assign, Call, Declare, Flag, For, Function, Guard, If, Let, Section, Slice, Statement, Store, roots, walk,
+    Argument,
+    Assign,
+    Call,
+    Declare,
+    Flag,
+    For,
+    Function,
+    Guard,
+    If,
+    Let,
+    Section,
+    Slice,
+    Statement,
+    Store,
+    roots,
+    walk,
 )  # fmt: skip
 
 STATUS = Argument("flags", "{name}_status_t", pointer=True, constant=False)
@@ -46,7 +62,7 @@ def lower(code: FilterCode, formats: Formats) -> Lowered:
         blocks.append(replace(block, initial=initial))
     lowered = replace(
         code, blocks=tuple(blocks), functions=tuple(done.values()),
-        tables={tables[t]: name for t, name in code.tables.items() if t in tables},
+        tables=cast(Mapping[Table, str], {tables[t]: name for t, name in code.tables.items() if t in tables}),
         lookups=tuple(lookups[c][0] for c in code.lookups if c in lookups), constants={},
     )  # fmt: skip
     return Lowered(lowered, tallies)
@@ -254,8 +270,9 @@ class _Statements:
         return name in self.ties and self._is_outside(self.ties[name])
 
     def _is_outside(self, cell: Cell) -> bool:
-        return cell[1] in ("kf.x", "kf.nis", "kf.log_likelihood") or (cell[0] == "array" and cell[2] in ("P", "S", "Q", "R")
-                                                                     and not self.f.private)  # fmt: skip
+        if cell[1] in ("kf.x", "kf.nis", "kf.log_likelihood"):
+            return True
+        return cell[0] == "array" and cell[2] in ("P", "S", "Q", "R") and not self.f.private
 
     def inverse(self, s: Let) -> list[Statement] | None:
         """A reciprocal whose size varies much is not kept: every quotient is divided."""

@@ -14,7 +14,19 @@ from typing import Any
 from kfgen.fixed.cells import Arrays, Cell, array_of, number_of
 from kfgen.ir.nodes import Node, Table
 from kfgen.ir.program import (
-    Assign, Call, Declare, Flag, For, Function, Guard, If, Let, Section, Slice, Statement, Store,
+    Assign,
+    Call,
+    Declare,
+    Flag,
+    For,
+    Function,
+    Guard,
+    If,
+    Let,
+    Section,
+    Slice,
+    Statement,
+    Store,
 )  # fmt: skip
 
 HUGE = 1e30  # what is beyond has left the model
@@ -79,7 +91,7 @@ class RealProgram:
         }  # fmt: skip
         for f in functions:
             text = (source or Source)(f, self).text()
-            exec(compile(text, f"<{f.name}>", "exec"), self._scope)  # noqa: S102 - our own text, see above
+            exec(compile(text, f"<{f.name}>", "exec"), self._scope)
 
     def table(self, table: Table) -> str:
         name = f"table_{len(self._scope)}"
@@ -102,6 +114,14 @@ class RealProgram:
     def constants(self, numbers: tuple[Any, ...]) -> str:
         return self.bound([float(v) for v in numbers])
 
+    def data(self, data: object) -> str:
+        """What an operation holds beside its arguments, as the source may use it."""
+        return self.bound(data)
+
+    def numbers(self, numbers: tuple[Any, ...]) -> str:
+        """A table of constants."""
+        return self.constants(numbers)
+
     def run(self, function: str, memory: Memory) -> str:
         """Run a function; the name of the status with which it ended."""
         result: str = self._scope[f"f_{function}"](memory.arrays, memory.numbers)
@@ -119,7 +139,7 @@ class Source:
         self.depth = 1
         self.count = 0
         self.private = {a.name for a in function.arguments if a.size is not None} if function.private else set()
-        self.local = set()
+        self.local: set[str] = set()
 
     def text(self) -> str:
         if self.f.private:
@@ -186,8 +206,8 @@ class Source:
                 c = self.value(condition)
                 self.emit(f"if {c}:")
                 self.depth += 1
-                for b in before:
-                    self.store(b)
+                for inner in before:
+                    self.store(inner)
                 self.emit(f"return {status!r}")
                 self.depth -= 1
             case Flag(condition=condition):
@@ -294,7 +314,7 @@ class Source:
             return self.new(f"segment({args[0]}, {self.program.table(node.data)}_x)")
         if node.op == "half":
             return f"({args[0]} // 2)"
-        return f"({args[0]} {dict(add='+', sub='-', mul='*')[node.op]} {args[1]})"
+        return f"({args[0]} { {'add': '+', 'sub': '-', 'mul': '*'}[node.op]} {args[1]})"
 
     def shortcut(self, node: Node) -> str:
         self.count += 1

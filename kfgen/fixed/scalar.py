@@ -51,10 +51,10 @@ class Fixed:
             name = op.removeprefix(PREFIX)
             if op in ("q_fma", "q_far"):
                 c, a, b = args
-                assert abs(a) <= INSIDE and abs(b) <= INSIDE, "factors that were proved to be small are not"
+                assert max(abs(a), abs(b)) <= INSIDE, "factors that were proved to be small are not"
                 return self._proved(c + arithmetic.scale(a * b, data[0], self.rounding))
             if op == "q_mac":
-                return self._mac(*args, data[0])
+                return self._mac(args, data[0])
             if op == "q_fit":
                 if abs(args[0]) > INSIDE:
                     self.status.saturate()
@@ -70,9 +70,10 @@ class Fixed:
         value = _OPERATIONS[op](data, *args)
         return value if isinstance(value, bool) else self._proved(value)
 
-    def _mac(self, c: int, a: int, b: int, s: int) -> int:
+    def _mac(self, args: list[int], s: int) -> int:
         """c + a b / 2^s: the product clipped where it is beyond 2^30, then the sum."""
-        assert abs(a) <= INSIDE and abs(b) <= INSIDE and abs(c) <= INSIDE
+        assert max(map(abs, args)) <= INSIDE
+        c, a, b = args
         product = a * b
         if -(1 << (s + 30)) <= product < 1 << (s + 30):
             total = c + arithmetic.scale(product, s, self.rounding)

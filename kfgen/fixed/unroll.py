@@ -8,7 +8,21 @@ from fractions import Fraction
 
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import (
-    Assign, Call, Declare, Flag, For, Function, Guard, If, Let, Section, Slice, Statement, Store, roots, walk,
+    Assign,
+    Call,
+    Declare,
+    Flag,
+    For,
+    Function,
+    Guard,
+    If,
+    Let,
+    Section,
+    Slice,
+    Statement,
+    Store,
+    roots,
+    walk,
 )  # fmt: skip
 
 
@@ -40,9 +54,9 @@ def _touches(loop: For) -> bool:
             return True
         while stack:
             node = stack.pop()
-            if node.op == "element" and node.kind == "real" and node.args[0].constant is None:
-                if node.data not in local:
-                    return True
+            field = node.op == "element" and node.kind == "real" and node.data not in local
+            if field and node.args[0].constant is None:
+                return True
             stack += node.args
     return False
 
@@ -69,8 +83,7 @@ class _Unroller:
         match s:
             case For(variable=variable, start=start, stop=stop, body=body, down=down):
                 first, last = node(start).constant, node(stop).constant
-                assert first is not None and last is not None, "a loop over fields has a fixed length"
-                counters = range(int(first), int(last))
+                counters = range(_known(first), _known(last))
                 out: list[Statement] = []
                 for i in reversed(counters) if down else counters:
                     self.copies += 1
@@ -128,6 +141,11 @@ class _Unroller:
                 if n.data.endswith(f"_{name}"):
                     return integer(table[int(args[0].constant)])
         return make(n.op, args, n.data, n.kind)
+
+
+def _known(value: Fraction | None) -> int:
+    assert value is not None, "a loop over fields has a fixed length"
+    return int(value)
 
 
 def fold(op: str, args: tuple[Node, ...], kind: str) -> Node | None:

@@ -29,7 +29,6 @@ ALLOWED = {
     # from a spec to C
     "ir": {"errors"},
     "scalars": {"errors", "ir"},
-    "fixed": set(),
     "quantiles": {"ir"},
     "model": SPEC | {"ir"},
     "filters": SPEC | {"ir", "model", "quantiles", "scalars"},
