@@ -7,6 +7,7 @@ filter is given. An operation that the interval proves to fit is plain C; every 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, floor
@@ -745,9 +746,8 @@ class Expressions:
                 a = self.fit(self.value(node.args[0], e))
                 return Raw(make("q_abs", (a.node,)), a.e, 0, LIMIT)
             case "min" | "max":
-                a, b = (self.value(n, e) for n in node.args)
-                shared = max(a.e, b.e)
-                a, b = self.at(a, shared), self.at(b, shared)
+                a, b = self.together(node.args)
+                shared = a.e
                 pick = min if op == "min" else max
                 return Raw(make(f"q_{op}", (a.node, b.node)), shared, pick(a.low, b.low), pick(a.high, b.high))
             case "sign":
@@ -773,16 +773,30 @@ class Expressions:
             out = min(max(e, -30), 0)
             self.c.tally.guarded += 1
             return Raw(make(f"q_{op}", (a.node,), (-a.e, -out)), out)
-        a, b = (self._placed(self.value(n)) for n in node.args)
+        if op == "atan2":
+            a, b = self.together(node.args)
+        else:
+            a, b = (self._placed(self.value(n)) for n in node.args)
         out = min(max(e, -30), 0)
         self.c.tally.guarded += 1
         if op == "atan2":
             out = max(out, -29)
-            shared = max(a.e, b.e)
-            return Raw(make("q_atan2", (self.at(a, shared).node, self.at(b, shared).node), (-out,)), out)
+            return Raw(make("q_atan2", (a.node, b.node), (-out,)), out)
         if op == "pow":
             return Raw(make("q_pow", (a.node, b.node), (-a.e, -b.e, -out)), out)
         raise NotImplementedError(op)
+
+    def together(self, nodes: Sequence[Node]) -> list[Raw]:
+        """Values in one format: the finest in which all of them fit."""
+        raws = [self.value(n) for n in nodes if n.constant is None]
+        e = min((r.e for r in raws), default=-BITS)
+        for n in nodes:
+            if n.constant:
+                e = max(e, size_of(n.constant) - BITS)
+        for r in raws:  # what the interval allows must fit when it is shifted left, or has no meaning
+            while r.e > e and r.size << (r.e - e) > LIMIT:
+                e += 1
+        return [self.value(n, e) for n in nodes]
 
     def _placed(self, a: Raw) -> Raw:
         """With 0 to 30 fraction bits, as functions take their arguments."""
@@ -791,12 +805,11 @@ class Expressions:
     def root(self, node: Node, e: int | None) -> Raw:
         squares = self._squares(node.args[0])
         if squares is not None:
-            raws = [self.value(n) for n in squares]
-            shared = max(r.e for r in raws)
-            total = self.at(raws[0], shared)
+            raws = self.together(squares)
+            total, shared = raws[0], raws[0].e
             for r in raws[1:]:
                 self.c.tally.guarded += 1
-                total = Raw(make("q_hypot", (total.node, self.at(r, shared).node)), shared, 0, LIMIT)
+                total = Raw(make("q_hypot", (total.node, r.node)), shared, 0, LIMIT)
             return total
         a = self.value(node.args[0])
         if e is None:
