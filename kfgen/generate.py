@@ -63,7 +63,9 @@ def _fixed(spec: Spec, overridden: bool, log: Log | None) -> Generated:
     real = build_filter(spec, scalar, RESERVED)
     result = build_fixed(real, scalar, log)
     view = make_view(result.code, scalar, overridden, result.view)
-    return Generated(render(view), summary(real, view), result.code, view, result)
+    told = summary(real, view)
+    told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
+    return Generated(render(view), told, result.code, view, result)
 
 
 def summary(code: FilterCode, view: View) -> Summary:

@@ -16,6 +16,7 @@ from kfgen.errors import KfgenError, Mistake, SpecError
 
 if TYPE_CHECKING:
     from kfgen.generate import Generated
+    from kfgen.logs import Log
     from kfgen.spec.types import Spec
 
 
@@ -50,7 +51,10 @@ class Built:
     "--check", "only_check", is_flag=True,
     help="Write nothing; exit 1 with a unified diff when the files on disk are not what would be written.",
 )  # fmt: skip
-@click.option("--log", type=click.Path(path_type=Path), metavar="LOG", hidden=True)
+@click.option(
+    "--log", type=click.Path(path_type=Path), metavar="LOG.csv",
+    help="A log whose ranges a fixed-point filter is to hold, beside those of simulated runs.",
+)  # fmt: skip
 @click.option("--selftest", is_flag=True, hidden=True)
 @click.option("--layout", metavar="L", hidden=True)
 def build(
@@ -66,10 +70,10 @@ def build(
 
     All specs are checked before anything is written.
     """
-    for option, given in (("--log", log), ("--selftest", selftest), ("--layout", layout)):
+    for option, given in (("--selftest", selftest), ("--layout", layout)):
         if given:
             raise KfgenError(f"build {option} is not built yet in this version")
-    built = generate_all(specs, directory, scalar)
+    built = generate_all(specs, directory, scalar, log)
     _warn(built)
     if only_check:
         sys.exit(1 if report_differences(built) else 0)
@@ -79,7 +83,9 @@ def build(
     click.echo(table(built))
 
 
-def generate_all(paths: Sequence[Path], directory: Path, scalar: str | None) -> list[Built]:
+def generate_all(
+    paths: Sequence[Path], directory: Path, scalar: str | None, log: Path | None = None
+) -> list[Built]:
     """Generate every spec; a SpecError holds the mistakes of all of them. KfgenError for two of one name."""
     specs: list[Spec] = []
     mistakes: list[Mistake] = []
@@ -101,12 +107,21 @@ def generate_all(paths: Sequence[Path], directory: Path, scalar: str | None) -> 
     built = []
     for spec in specs:
         try:
-            built.append(Built(spec, generate(spec), directory / spec.name))
+            built.append(Built(spec, generate(spec, log=_read(log, spec)), directory / spec.name))
         except SpecError as error:
             mistakes += error.mistakes
     if mistakes:
         raise SpecError(mistakes)
     return built
+
+
+def _read(log: Path | None, spec: Spec) -> Log | None:
+    """The log that fixed point takes ranges from; other scalars have no use for one."""
+    if log is None or spec.scalar in ("float", "double"):
+        return None
+    from kfgen.logs import read
+
+    return read(log, spec)
 
 
 def _warn(built: Sequence[Built]) -> None:
