@@ -382,7 +382,7 @@ class Expressions:
         if all(f.constant is None for _, f in plain):
             for _ in range(2):  # head-room for whatever is given, where digits are to spare
                 bound = sum(Fraction(r.size) * power(r.e) for r in raws)
-                if bound > LIMIT * power(e) and e + 1 <= needed + 12:
+                if bound > (INSIDE + 1) * power(e) and e + 1 <= needed + 12:
                     e += 1
         return e
 

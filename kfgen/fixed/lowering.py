@@ -106,7 +106,8 @@ class Plan:
         e = self.exponent(self.ties[s.name]) if s.name in self.ties else None
         natural, least = self.c.formats.node(s.node), self.c.formats.least(s.node)
         wants = self.wants.get(s.name, [])
-        if e is None and wants and natural is not None and least is not None:
+        given = s.node.op == "sum" and any(a.op == "field" for a in s.node.args)  # by the user: all of it is to fit
+        if e is None and wants and not given and natural is not None and least is not None:
             fitting = [w for w in wants if least <= w < natural]
             if fitting:
                 e = self.c.planned[s.name] = min(fitting)
@@ -252,7 +253,7 @@ class _Statements:
             if e is not None and name in self.ties:
                 least = self.c.formats.node(node, 0)
                 e = None if least is not None and least > e else e
-            if name not in self.ties and node.op in ("mul", "sum"):
+            if name not in self.ties and (node.op == "mul" or (node.op == "sum" and e is not None)):
                 e = self.x.useful(node, e)
             if name not in self.ties and node.op == "mul":
                 e = self.x.roomier(node, e)

@@ -151,3 +151,25 @@ def test_no_floating_point_and_no_libm():
     text = files["turn.c"]
     assert "math.h" not in text
     assert not {"float", "double"} & set(text.replace("(", " ").split())
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("what", ["z", "x"])
+def test_extreme_arguments_are_followed(what, sign):
+    spec = loads(BALL)
+    kf, ref = kfgen.compile(spec), kfgen.reference(override(spec, "double"))
+    log = simulate.simulate(spec, 60, seed=5)
+    flags = 0
+    for k in range(60):
+        kf.predict()
+        ref.predict()
+        z = log.columns["pos.s"][k : k + 1]
+        if k == 20 and what == "z":
+            z = sign * (2.0**31 - 1) * kf._units.z["pos"]
+        if k == 20 and what == "x":
+            kf.set_state(sign * (2.0**31 - 1) * kf._units.x)
+            ref.set_state(kf.x)
+        flags |= kf.update("pos", z)
+        ref.update("pos", z)
+    assert flags == Status.SATURATED  # nis, at least
+    assert np.max(np.abs(kf.x - ref.x) / np.sqrt(np.diag(ref.P))) < 0.02
