@@ -21,7 +21,7 @@ from jinja2 import Environment
 FUNCTIONS = (
     "floor", "sqrt", "reciprocal", "sin", "cos", "tan", "atan", "asin", "acos", "exp", "log", "sinh", "cosh", "tanh",
 )  # fmt: skip
-BOUNDS = {name: 1.0 for name in FUNCTIONS} | {"tan": 2.0}
+BOUNDS = dict.fromkeys(FUNCTIONS, 1.0) | {"tan": 2.0}
 """The largest error, in units of the last place."""
 PARTS = 32
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -30,6 +31,7 @@ ARGUMENTS = {
 C_TYPES = {"w": "int64_t", "h": "int64_t", "i": "int32_t", "m": "int32_t"}
 NUMPY_TYPES = {"w": np.int64, "h": np.int64, "i": np.int32, "m": np.int32}
 RANGES = {"m": (1 - 2**30, 2**30 - 1), "s": (0, 62), "t": (-62, 62), "f": (0, 31), "g": (0, 30), "r": (0, 29)}
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 HEAD = "#include <stdbool.h>\n#include <stdint.h>\n#define SATURATED UINT32_C(0x20)\n"
 
 
@@ -108,4 +110,4 @@ def compiled(compiler: str, flags: tuple[str, ...], floor: bool = False) -> Rout
     return Routines(_folder() / f"{name}.so")
 
 
-__all__ = ["ARGUMENTS", "NEEDS", "RANGES", "compiled", "expected", "source"]
+__all__ = ["ARGUMENTS", "COMPILERS", "NEEDS", "RANGES", "compiled", "expected", "source"]
