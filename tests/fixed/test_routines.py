@@ -58,8 +58,10 @@ def test_rounding_down():
         assert routines(op, *columns(op)) == wanted(op, True), op
 
 
-def test_nothing_undefined(capfd):
-    routines = compiled("gcc", UNDEFINED)
+@pytest.mark.parametrize("target", [(), ("-D__ARM_ARCH_6M__", "-D__AVR__")], ids=["host", "narrow multiplier"])
+def test_nothing_undefined(target, capfd):
+    """Here, and in the code for processors that multiply to 32 bits."""
+    routines = compiled("gcc", (*UNDEFINED, *target))
     for op in ARGUMENTS:
         assert routines(op, *columns(op)) == wanted(op), op
     assert capfd.readouterr().err == ""
