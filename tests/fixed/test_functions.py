@@ -43,14 +43,6 @@ def test_functions_of_one_argument(program, function, fa, fr):
         assert found.crossed == 0 or (function in FLAT and fr > 24), found
 
 
-@pytest.mark.skipif("clang" not in COMPILERS, reason="needs clang")
-def test_nothing_undefined(tmp_path):
-    program = build(tmp_path, source(FUNCTIONS), ("-O1", "-fsanitize=undefined,integer-divide-by-zero"), "clang")
-    for function in FUNCTIONS:
-        run(program, function, 16, 16, -(2**31), 97 * 20, 20, 2**32 // 97 - 20)
-        run(program, function, 31, 16, -(2**31), 97 * 20, 20, 2**32 // 97 - 20)
-
-
 def raw(source: random.Random) -> int:
     return source.randrange(-(2**31), 2**31) >> source.randrange(32)
 
@@ -198,7 +190,7 @@ _LETTERS = {
 } | {letter: st.integers(*limits) for letter, limits in RANGES.items() if letter != "m"}
 
 
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=250, deadline=None, derandomize=True)
 @given(st.data())
 def test_python_is_c(data):
     op = data.draw(st.sampled_from(sorted(ARGUMENTS)))
