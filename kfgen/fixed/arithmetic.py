@@ -58,9 +58,9 @@ def mul(a: int, b: int, s: int, status: Status, rounding: str = NEAREST) -> int:
     return clamp(scale(a * b, s, rounding), status)
 
 
-def madd(c: int, a: int, b: int, s: int, status: Status, rounding: str = NEAREST) -> int:
-    """c + a b / 2^s, 0 <= s <= 62: the product is rounded, the sum saturates, once."""
-    return clamp(c + scale(a * b, s, rounding), status)
+def madd(c: int, a: int, b: int, s: int, rounding: str = NEAREST) -> int:
+    """c + a b / 2^s, |a|, |b| < 2^30, 0 <= s <= 62: the product is rounded, the sum saturates, without a flag."""
+    return max(-LIMIT, min(LIMIT, c + scale(a * b, s, rounding)))
 
 
 def shift(a: int, s: int, status: Status, rounding: str = NEAREST) -> int:

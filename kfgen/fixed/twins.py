@@ -36,4 +36,4 @@ TWINS: dict[str, Callable[..., int]] = {
     "pow": exponential.pow,
 }
 """name -> function; the arguments are those of the C routine, `status` last where it has one."""
-WITHOUT_STATUS = frozenset({"floor", "atan2"})
+WITHOUT_STATUS = frozenset({"madd", "floor", "atan2"})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -19,15 +20,18 @@ from kfgen.fixed.arithmetic import Status
 from kfgen.fixed.routines import NEEDS, closure
 from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
 
-# routine -> its arguments: w an int64_t, h a positive one, i a raw int32_t, each other letter an int of its own range
+# routine -> its arguments: w an int64_t, h a positive one, i a raw int32_t, m one below 2^30; other letters are ints
+# of a range of their own
 ARGUMENTS = {
-    "narrow": "ws", "mul": "iis", "madd": "iiis", "add": "ii", "sub": "ii", "shift": "it", "div": "iit",
+    "narrow": "ws", "mul": "iis", "madd": "imms", "add": "ii", "sub": "ii", "shift": "it", "div": "iit",
     "reciprocal": "is", "sqrt": "it", "floor": "if", "wrap": "ih", "hypot": "ii", "sin": "iff", "cos": "iff",
     "atan": "iff", "atan2": "iir", "exp": "iff", "log": "iff", "tan": "ifg",
     "asin": "ifg", "acos": "ifg", "sinh": "ifg", "cosh": "ifg", "tanh": "ifg", "pow": "ififg",
 }  # fmt: skip
-C_TYPES = {"w": "int64_t", "h": "int64_t", "i": "int32_t"}
-RANGES = {"s": (0, 62), "t": (-62, 62), "f": (0, 31), "g": (0, 30), "r": (0, 29)}
+C_TYPES = {"w": "int64_t", "h": "int64_t", "i": "int32_t", "m": "int32_t"}
+NUMPY_TYPES = {"w": np.int64, "h": np.int64, "i": np.int32, "m": np.int32}
+RANGES = {"m": (1 - 2**30, 2**30 - 1), "s": (0, 62), "t": (-62, 62), "f": (0, 31), "g": (0, 30), "r": (0, 29)}
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 HEAD = "#include <stdbool.h>\n#include <stdint.h>\n#define SATURATED UINT32_C(0x20)\n"
 
 
@@ -63,7 +67,7 @@ class Routines:
         """Results and statuses for columns of arguments."""
         n = len(columns[0])
         letters = ARGUMENTS[op]
-        types = [{"w": np.int64, "h": np.int64, "i": np.int32}.get(letter, np.intc) for letter in letters]
+        types = [NUMPY_TYPES.get(letter, np.intc) for letter in letters]
         arrays: list[Any] = [np.array(c, dtype=t) for c, t in zip(columns, types, strict=True)]
         result, status = np.zeros(n, np.int32), np.zeros(n, np.uint32)
         names = [C_TYPES.get(letter, "int") for letter in letters]
@@ -106,4 +110,4 @@ def compiled(compiler: str, flags: tuple[str, ...], floor: bool = False) -> Rout
     return Routines(_folder() / f"{name}.so")
 
 
-__all__ = ["ARGUMENTS", "NEEDS", "RANGES", "compiled", "expected", "source"]
+__all__ = ["ARGUMENTS", "COMPILERS", "NEEDS", "RANGES", "compiled", "expected", "source"]
