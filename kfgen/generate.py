@@ -10,8 +10,11 @@ from kfgen.emit.view import View, make_view
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
+from kfgen.fixed.build import FixedFilter, build_fixed
+from kfgen.fixed.scalar import Fixed
 from kfgen.ir.count import operations
 from kfgen.ir.schedule import RESERVED
+from kfgen.logs import Log
 from kfgen.scalars import SCALARS
 from kfgen.spec.types import Spec
 
@@ -34,18 +37,21 @@ class Generated:
     summary: Summary
     code: FilterCode
     view: View
+    fixed: FixedFilter | None = None
 
 
-def build(spec: Spec, scalar: str | None = None, *, judge: bool = True) -> Generated:
-    """Generate a spec's files. scalar overrides the spec's. Raises SpecError.
+def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judge: bool = True) -> Generated:
+    """Generate a spec's files. scalar overrides the spec's; log: what a q scalar takes its ranges from, beside
+    simulated runs. Raises SpecError.
 
     judge: whether a budget that the prediction exceeds is an error.
     """
     overridden = scalar is not None and scalar != spec.scalar
     if scalar is not None:
         spec = replace(spec, scalar=scalar)
-    # a scalar that is not built yet is refused by name, with all else that is not
-    code = build_filter(spec, SCALARS.get(spec.scalar, SCALARS["float"]), RESERVED)
+    if spec.scalar not in SCALARS:
+        return _fixed(spec, overridden, log)
+    code = build_filter(spec, SCALARS[spec.scalar], RESERVED)
     try:
         view = make_view(code, SCALARS[spec.scalar], overridden)
     except OverflowError as error:
@@ -53,6 +59,21 @@ def build(spec: Spec, scalar: str | None = None, *, judge: bool = True) -> Gener
         raise SpecError.at(
             place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
         ) from None
+    return Generated(render(view), summary(code, view), code, view)
+
+
+def _fixed(spec: Spec, overridden: bool, log: Log | None) -> Generated:
+    scalar = Fixed(spec.scalar, spec.fixed.rounding)
+    real = build_filter(spec, scalar, RESERVED)
+    result = build_fixed(real, scalar, log)
+    view = make_view(result.code, scalar, overridden, result.view)
+    told = summary(real, view)
+    told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
+    return Generated(render(view), told, result.code, view, result)
+
+
+def summary(code: FilterCode, view: View) -> Summary:
+    """What the build table shows of a filter."""
     rows = []
     for function in code.functions:
         counts = operations(function.body)
@@ -66,7 +87,7 @@ def build(spec: Spec, scalar: str | None = None, *, judge: bool = True) -> Gener
         order = "" if mode.order == code.order else f"; inner order: {inner}"
         notes.append(f"{mode.name}: {mode.description}{order}")
     notes += code.remarks
-    return Generated(render(view), Summary(rows, view.ram, notes, code.forms), code, view)
+    return Summary(rows, view.ram, notes, code.forms)
 
 
 def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:

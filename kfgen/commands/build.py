@@ -17,6 +17,7 @@ from kfgen.layouts import Package, arrange, layouts
 
 if TYPE_CHECKING:
     from kfgen.generate import Generated
+    from kfgen.logs import Log
     from kfgen.spec.types import Spec
 
 
@@ -53,7 +54,10 @@ class Built:
     "--check", "only_check", is_flag=True,
     help="Write nothing; exit 1 with a unified diff when the files on disk are not what would be written.",
 )  # fmt: skip
-@click.option("--log", type=click.Path(path_type=Path), metavar="LOG", hidden=True)
+@click.option(
+    "--log", type=click.Path(path_type=Path), metavar="LOG.csv",
+    help="A log whose ranges a fixed-point filter is to hold, beside those of simulated runs.",
+)  # fmt: skip
 @click.option(
     "--selftest", is_flag=True,
     help="Also write <name>_selftest.c, which replays a recorded run: <name>_selftest() is 0 where the filter works.",
@@ -75,9 +79,7 @@ def build(
 
     All specs are checked before anything is written.
     """
-    if log is not None:
-        raise KfgenError("build --log is not built yet in this version")
-    built = generate_all(specs, directory, scalar, selftest, layout)
+    built = generate_all(specs, directory, scalar, selftest, layout, log)
     _warn(built)
     if only_check:
         sys.exit(1 if report_differences(built) else 0)
@@ -88,7 +90,8 @@ def build(
 
 
 def generate_all(
-    paths: Sequence[Path], directory: Path, scalar: str | None, selftest: bool = False, layout: str = "plain"
+    paths: Sequence[Path], directory: Path, scalar: str | None, selftest: bool = False, layout: str = "plain",
+    log: Path | None = None,
 ) -> list[Built]:
     """Generate every spec; a SpecError holds the mistakes of all of them. KfgenError for two of one name."""
     specs: list[Spec] = []
@@ -111,7 +114,7 @@ def generate_all(
     built = []
     for spec in specs:
         try:
-            generated = generate(spec)
+            generated = generate(spec, log=_read(log, spec))
             texts = dict(generated.files)
             if selftest:
                 from kfgen.selftest import selftest as recorded
@@ -146,6 +149,15 @@ def _package(spec: Spec, generated: Generated, texts: Mapping[str, str], layout:
         run_time=header.takes("predict", "dt"),
         takes_inputs=tuple(name for name in functions if header.takes(name, "u")),
     )
+
+
+def _read(log: Path | None, spec: Spec) -> Log | None:
+    """The log that fixed point takes ranges from; other scalars have no use for one."""
+    if log is None or spec.scalar in ("float", "double"):
+        return None
+    from kfgen.logs import read
+
+    return read(log, spec)
 
 
 def _warn(built: Sequence[Built]) -> None:

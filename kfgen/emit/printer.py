@@ -40,6 +40,7 @@ class Printer:
         self.index_name = index_name
         self.tables = tables
         self.has_flags = has_flags
+        self.status = "&flags"  # what a routine is given that may saturate
         self.helpers: set[str] = set()
 
     # expressions -------------------------------------------------------------------------------------
@@ -127,6 +128,13 @@ class Printer:
     def _call(self, node: Node) -> str:
         args = [self.expression(a) for a in node.args]
         op = node.op
+        if op.startswith("q_"):
+            self.helpers.add(op)
+            args += [str(d) if abs(d) < 2**31 else f"INT64_C({d})" for d in node.data or ()]
+            args += [] if op in self.scalar.silent_ops else [self.status]
+            return f"{self.prefix}_{op}({', '.join(args)})"
+        if op.startswith("table_"):
+            return f"{self.tables[node.data]}{op.removeprefix('table')}[{args[0]}]"
         if op in self.scalar.helper_ops:
             self.helpers.add(op)
             if op == "wrap":

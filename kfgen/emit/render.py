@@ -28,7 +28,7 @@ def _template(name: str) -> str:
 
 @cache
 def _environment() -> Environment:
-    return Environment(
+    environment = Environment(
         loader=FunctionLoader(_template),
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -36,6 +36,8 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
+    environment.filters |= {"u32": "UINT32_C({})".format, "i64": "INT64_C({})".format}
+    return environment
 
 
 def render(view: View) -> dict[str, str]:
@@ -51,6 +53,11 @@ def render_c(template: str, **names: Any) -> str:
 def render_text(template: str, **names: Any) -> str:
     """The text of a template as it stands, for what is not C."""
     return _environment().get_template(template).render(**names)
+
+
+def macro(template: str, name: str, *arguments: Any, **options: Any) -> str:
+    """What one macro of a template file gives."""
+    return _tidy(str(getattr(_environment().get_template(template).module, name)(*arguments, **options)))
 
 
 def _tidy(text: str) -> str:

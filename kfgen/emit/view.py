@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from importlib.metadata import PackageNotFoundError, version
@@ -15,7 +15,7 @@ from kfgen.emit.printer import WIDTH, Printer, comment
 from kfgen.filters.base import FilterCode
 from kfgen.ir.count import operations
 from kfgen.ir.nodes import Constants, Table
-from kfgen.ir.program import Argument, Flag, Function, Guard, walk
+from kfgen.ir.program import Argument, Call, Flag, Function, Guard, roots, walk
 from kfgen.ir.schedule import LIBRARY_NAMES
 from kfgen.scalars import Scalar
 
@@ -39,6 +39,9 @@ _TABLES = {
     "order": "inner position -> index into x",
     "reach": "pair of columns of F U -> how many of its leading entries may differ from zero",
 }
+_QUIET = frozenset({"q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far", "q_abs"})
+OWN = frozenset({"abs", "min", "max", "sign", "count", "fma", "far", "fit", "mac"})
+"""Routines of fixed point that stand in the template of the lowered program."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,7 @@ class FunctionView:
 @dataclass(frozen=True)
 class ScalarView:
     name: str
+    fraction_bits: int | None  # fixed point only
     c_type: str
     helpers: str
     zero: str
@@ -125,6 +129,8 @@ class View:
     tables: tuple[Data, ...]
     helpers: tuple[str, ...]
     uses_math: bool
+    units: tuple[Named, ...]  # fixed point: quantity -> the value of raw 1
+    routines: Routines | None  # fixed point: what the routines are made of
 
 
 def package_version() -> str:
@@ -134,13 +140,39 @@ def package_version() -> str:
         return "0"
 
 
-def make_view(code: FilterCode, scalar: Scalar, overridden: bool) -> View:
+@dataclass(frozen=True)
+class FixedPoint:
+    """What the text of a fixed-point filter says beside its code.
+
+    units: macro's name -> exponent of the value of raw 1. table: the report, in lines. floor: products round down.
+    """
+
+    fraction_bits: int
+    units: tuple[tuple[str, int], ...]
+    table: tuple[str, ...]
+    floor: bool
+    closure: Callable[[Iterable[str], bool], tuple[str, ...]]
+    tables: object
+
+
+@dataclass(frozen=True)
+class Routines:
+    """What the template of the integer routines is given."""
+
+    ops: tuple[str, ...]
+    own: tuple[str, ...]
+    tables: object
+    floor: bool
+
+
+def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPoint | None = None) -> View:
     """The view of a filter; overridden: the scalar is not the spec's own."""
-    return _ViewMaker(code, scalar, overridden).make()
+    return _ViewMaker(code, scalar, overridden, fixed).make()
 
 
 class _ViewMaker:
-    def __init__(self, code: FilterCode, scalar: Scalar, overridden: bool) -> None:
+    def __init__(self, code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPoint | None = None) -> None:
+        self.fixed = fixed
         self.code = code
         self.scalar = scalar
         self.overridden = overridden
@@ -171,7 +203,8 @@ class _ViewMaker:
             sha256=spec.sha256,
             ram=struct.ram(scalar, code.blocks, len(spec.parameters)),
             scalar=ScalarView(
-                scalar.name, scalar.c_type, scalar.helpers, scalar.literal(Fraction(0)), scalar.literal(Fraction(1)),
+                scalar.name, None if self.fixed is None else self.fixed.fraction_bits, scalar.c_type,
+                scalar.helpers, scalar.literal(Fraction(0)), scalar.literal(Fraction(1)),
                 scalar.function("ceil"),
             ),
             states=self.aligned([
@@ -205,8 +238,26 @@ class _ViewMaker:
             ),
             tables=tuple(self.table_data()),
             helpers=tuple(sorted(self.helpers)),
-            uses_math=bool(self.helpers & {"wrap"}) or any(f"{f}(" in text for f in LIBRARY_NAMES),
+            units=self.units(),
+            routines=self.routines(),
+            uses_math=self.fixed is None
+            and (bool(self.helpers & {"wrap"}) or any(f"{f}(" in text for f in LIBRARY_NAMES)),
         )  # fmt: skip
+
+    # fixed point ---------------------------------------------------------------------------------------
+
+    def units(self) -> tuple[Named, ...]:
+        if self.fixed is None:
+            return ()
+        return tuple(Named(name, value=repr(2.0**e)) for name, e in self.fixed.units)
+
+    def routines(self) -> Routines | None:
+        if self.fixed is None:
+            return None
+        used = {op.removeprefix("q_") for op in self.helpers if op.startswith("q_")}
+        used |= {"product", "round"} if used & {"fma", "far", "mac"} else set()
+        own = tuple(sorted(used & OWN))
+        return Routines(self.fixed.closure(used - OWN, self.fixed.floor), own, self.fixed.tables, self.fixed.floor)
 
     # header ------------------------------------------------------------------------------------------
 
@@ -243,6 +294,9 @@ class _ViewMaker:
             limits = [f"{word} {float(v):g} s" for word, v in (("at least", low), ("at most", high)) if v is not None]
             step = "given at each step" + (f", clamped to {', '.join(limits)}" if limits else "")
         out.append(Data(title=f"step: {step}"))
+        if self.fixed is not None:
+            out.append(Data(title="", lines=()))
+            out.append(Data(title="value of raw 1, range reckoned with, and bits above it", lines=self.fixed.table))
         return out
 
     def counted(self, function: Function) -> bool:
@@ -266,7 +320,11 @@ class _ViewMaker:
 
     def function(self, f: Function) -> FunctionView:
         has_flags = any(isinstance(s, Flag) for s in walk(f.body))
+        saturates = self.fixed is not None and may_saturate(f)
+        has_flags = has_flags or saturates
         printer = Printer(self.name, self.scalar, self.index_name, self.tables, has_flags)
+        if f.private:
+            printer.status = "flags"
         body = printer.statements(f.body)
         self.helpers |= printer.helpers
         void = f.returns == "void"
@@ -276,7 +334,7 @@ class _ViewMaker:
         test = " || ".join(f"{p} == NULL" for p in pointers)
         leave = "return;" if void else f"return {self.NAME}_NULL_ARGUMENT;"
         opening = [] if f.private else [f"if ({test}) {{ {leave} }}"]
-        if has_flags:
+        if has_flags and not f.private:
             opening.append(f"{self.name}_status_t flags = {self.NAME}_OK;")
         if body and body[0].lstrip().startswith("/*"):
             opening.append("")
@@ -310,6 +368,8 @@ class _ViewMaker:
 
     def outcome(self, f: Function) -> str:
         flags = sorted({s.flag for s in walk(f.body) if isinstance(s, Flag)})
+        if self.fixed is not None and may_saturate(f):
+            flags.append("SATURATED")
         flags += sorted({s.status for s in walk(f.body) if isinstance(s, Guard) and s.status == "GATED"})
         text = f"{self.NAME}_OK" + "".join(f", {self.NAME}_{flag}" for flag in flags)
         return (
@@ -337,6 +397,20 @@ class _ViewMaker:
                 text = ", ".join(self.scalar.literal(v) for v in values)
                 out.append(Data(name=f"{name}_{suffix}", size=len(values), lines=tuple(_fill(text, WIDTH - 6))))
         return out
+
+
+def may_saturate(f: Function) -> bool:
+    """Whether anything in a fixed-point function is given the status."""
+    for s in walk(f.body):
+        if isinstance(s, Call):
+            return True
+        stack = list(roots(s))
+        while stack:
+            node = stack.pop()
+            if node.op.startswith("q_") and node.op not in _QUIET:
+                return True
+            stack += node.args
+    return False
 
 
 def _signature(head: str, arguments: list[str]) -> list[str]:

@@ -17,8 +17,8 @@ def unbuilt(spec: Spec) -> list[Mistake]:
     def place(key: str) -> Place:
         return filter_.places.get(key, filter_.place)
 
-    if spec.scalar not in ("float", "double"):
-        refuse(spec.places.get("scalar", spec.place), f"scalar: {spec.scalar}", "use float or double")
+    if spec.imm is not None and spec.scalar not in ("float", "double"):
+        refuse(spec.places.get("scalar", spec.place), f"imm with scalar: {spec.scalar}", "use float or double")
     code = spec.code
     for key, wanted in {
         "ram": code.ram, "stack": code.stack,

@@ -7,8 +7,9 @@ from collections import Counter
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Call, For, If, Statement, roots
 
-_FREE = {"const", "field", "element", "read", "variable", "counter", "real", "neg", "half", "finite", "bit", "lookup"}
-_NAMES = {"lt": "compare", "le": "compare"}
+_FREE = {"const", "field", "element", "read", "variable", "counter", "real", "neg", "half", "finite", "bit", "lookup",
+         "q_count", "q_fit", "table_x", "table_y", "table_slope"}
+_NAMES = {"lt": "compare", "le": "compare", "q_reciprocal": "div"}
 _SILENT = {"and", "or", "not"}
 
 
@@ -50,9 +51,12 @@ def _count(node: Node, counts: Counter[str]) -> None:
         if node.op == "sum":
             counts["add"] += len(node.data) - 1
             counts["mul"] += sum(1 for _, factors in node.data if factors == 2)
-        elif node.op in ("add", "sub"):
+        elif node.op in ("add", "sub", "q_add", "q_sub"):
             counts["add"] += 1
+        elif node.op in ("q_madd", "q_fma", "q_far", "q_mac"):
+            counts["add"] += 1
+            counts["mul"] += 1
         elif node.op not in _FREE and node.op not in _SILENT:
-            counts[_NAMES.get(node.op, node.op)] += 1
+            counts[_NAMES.get(node.op, node.op.removeprefix("q_"))] += 1
     for argument in node.args:
         _count(argument, counts)

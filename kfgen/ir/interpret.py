@@ -105,7 +105,7 @@ class _Machine:
                 memory.arrays[argument.name] = whole[start : start + argument.size]
                 if not argument.constant:
                     parts.append((argument.name, whole, start))
-            elif isinstance(given, Node):
+            elif isinstance(given, Node):  # `kf`, `u`, `flags` are at hand
                 memory.numbers[argument.name] = self.value(given)
         _Machine(self.scalar, memory).block(call.callee.body)
         for name, whole, start in parts:

@@ -18,6 +18,7 @@ class Scalar(Protocol):
     size: int  # bytes
     helpers: str
     helper_ops: frozenset[str]
+    silent_ops: frozenset[str]  # routines of a fixed-point type that cannot saturate
     epsilon: Fraction  # relative spacing at 1
     smallest: Fraction  # the smallest number whose reciprocal is a number
 

@@ -85,7 +85,6 @@ def test_two_of_one_name(kfgen, folder):
         (["build"], "Missing argument"),
         (["build", "nowhere.yaml"], "nowhere.yaml"),
         (["build", SPEC, "--scalar", "half"], "scalar `half` is unknown"),
-        (["build", SPEC, "--log", "x.csv"], "--log is not built yet"),
         (["build", SPEC, "--layout", "x"], "'x' is not one of 'arduino', 'cmake', 'plain', 'platformio', 'zephyr'"),
         (["build", SPEC, "-o", "file/below"], "file"),
         (["build", SPEC, "--nothing"], "No such option"),

@@ -32,8 +32,9 @@ ALLOWED = {
     "quantiles": {"ir"},
     "model": SPEC | {"ir"},
     "filters": SPEC | {"ir", "model", "quantiles", "scalars"},
+    "fixed": SPEC | {"emit", "filters", "ir", "logs", "model", "scalars"},
     "emit": {"errors", "filters", "ir", "scalars"},
-    "generate": SPEC | {"emit", "filters", "ir", "scalars"},
+    "generate": SPEC | {"emit", "filters", "fixed", "ir", "logs", "scalars"},
     # the compiled filter, and what uses it
     "native": SPEC | {"files", "generate", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},

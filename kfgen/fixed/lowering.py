@@ -1,0 +1,376 @@
+"""The statements of a real program, in integers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import cast
+
+from kfgen.filters.base import FilterCode
+from kfgen.fixed.cells import Cell, affine, array_of, number_of
+from kfgen.fixed.expressions import DYNAMIC, LIMIT, Context, Expressions, QTable, Tally, constant, is_variance, nearest
+from kfgen.fixed.formats import BITS, Formats
+from kfgen.fixed.unroll import make
+from kfgen.ir.nodes import Constants, Node, Table
+from kfgen.ir.program import (
+    Argument,
+    Assign,
+    Call,
+    Declare,
+    Flag,
+    For,
+    Function,
+    Guard,
+    If,
+    Let,
+    Section,
+    Slice,
+    Statement,
+    Store,
+    roots,
+    walk,
+)  # fmt: skip
+
+STATUS = Argument("flags", "{name}_status_t", pointer=True, constant=False)
+
+
+@dataclass(frozen=True)
+class Lowered:
+    """An integer filter: its code, its tables in integers, and per function what was proved."""
+
+    code: FilterCode
+    tallies: dict[str, Tally]
+
+
+def lower(code: FilterCode, formats: Formats) -> Lowered:
+    """The filter in integers."""
+    tables: dict[Table, QTable] = {}
+    lookups: dict[Constants, tuple[Constants, int]] = {}
+    done: dict[str, Function] = {}
+    tallies: dict[str, Tally] = {}
+    for f in code.functions:
+        context = Context(f, formats, formats.arrays, tables, lookups)
+        done[f.name] = _Statements(context, done).function()
+        tallies[f.name] = context.tally
+    blocks = []
+    for block in code.blocks:
+        initial = tuple(
+            _raw(value, formats.of(formats.arrays.element(("array", f"kf.{block.name}"), i)), formats.bits)
+            for i, value in enumerate(block.initial)
+        )
+        blocks.append(replace(block, initial=initial))
+    lowered = replace(
+        code, blocks=tuple(blocks), functions=tuple(done.values()),
+        tables=cast(Mapping[Table, str], {tables[t]: name for t, name in code.tables.items() if t in tables}),
+        lookups={lookups[c][0]: name for c, name in code.lookups.items() if c in lookups}, constants={},
+    )  # fmt: skip
+    return Lowered(lowered, tallies)
+
+
+def _raw(value: Fraction, e: int | None, bits: int) -> Fraction:
+    return Fraction(max(-LIMIT, min(LIMIT, nearest(value, -bits if e is None else e))))
+
+
+class Plan:
+    """Exponents of locals, from the last use to the first: as fine as the products need in which they stand.
+
+    A product of two numbers below 2^30 fits where it is shifted by 30. So a gain is given less head-room where the
+    runs allow it, for the sake of plain multiply-adds that cannot overflow.
+    """
+
+    def __init__(self, context: Context, x: Expressions, ties: dict[str, Cell], exponent: Callable[[Cell], int],
+                 target: Callable[[Store | Assign], Cell]) -> None:  # fmt: skip
+        self.c = context
+        self.x = x
+        self.ties = ties
+        self.exponent = exponent
+        self.target = target
+        self.wants: dict[str, list[int]] = {}
+        self.nodes: dict[str, Node] = {}
+
+    def run(self, body: list[Statement]) -> None:
+        for s in walk(body):
+            if isinstance(s, Let) and s.node.kind == "real":
+                self.nodes[s.name] = self.c.nodes[s.name] = s.node
+        for s in reversed(list(walk(body))):
+            if isinstance(s, Let) and s.node.kind == "real":
+                self._let(s)
+            elif isinstance(s, Store | Assign) and s.node.kind == "real":
+                self._visit(s.node, self.exponent(self.target(s)))
+            else:
+                for root in roots(s):
+                    self._visit(root, None)
+
+    def _let(self, s: Let) -> None:
+        e = self.exponent(self.ties[s.name]) if s.name in self.ties else None
+        natural, least = self.c.formats.node(s.node), self.c.formats.least(s.node)
+        wants = self.wants.get(s.name, [])
+        given = s.node.op == "sum" and any(a.op == "field" for a in s.node.args)  # by the user: all of it is to fit
+        if e is None and wants and not given and natural is not None and least is not None:
+            fitting = [w for w in wants if least <= w < natural]
+            if fitting:
+                e = self.c.planned[s.name] = min(fitting)
+            elif min(wants) > natural + 2:  # finer than the products that it is in can use
+                e = self.c.planned[s.name] = min(min(wants) - 2, natural + 5)
+        self._visit(s.node, e)
+
+    def _of(self, node: Node) -> int | None:
+        """The exponent that a factor will have."""
+        if node.op == "variable":
+            inner = self.nodes.get(node.data)
+            if node.data in self.ties:
+                return self.exponent(self.ties[node.data])
+            if node.data in self.c.planned:
+                return self.c.planned[node.data]
+            return None if inner is None else self._of(inner) if inner.op in LEAVES else self.c.formats.node(inner)
+        if node.op == "field":
+            return self.exponent(number_of(self.c.function, node.data))
+        if node.op in ("element", "read"):
+            if not node.args:
+                return self.exponent(("variable", self.c.function.name, node.data))
+            return self.exponent(self.c.arrays.element(array_of(self.c.function, node.data), affine(node.args[0])[0]))
+        if node.op == "neg":
+            return self._of(node.args[0])
+        return self.c.formats.node(node)
+
+    def _visit(self, node: Node, e: int | None) -> None:
+        if node.op in ("sum", "mul", "add", "sub"):
+            e = self.c.formats.node(node) if e is None else e
+            terms = [(1, node.args)] if node.op == "mul" else self.x.terms(node)
+            for _, factors in terms:
+                if len(factors) == 1 and factors[0].op == "mul":
+                    factors = factors[0].args
+                if len(factors) == 2:
+                    for a, b in (factors, factors[::-1]):
+                        self._product(a, b, e)
+                for f in factors:
+                    self._visit(f, None)
+            return
+        for a in node.args:
+            self._visit(a, e if node.op == "select" else None)
+
+    def _product(self, a: Node, b: Node, e: int | None) -> None:
+        """What a has to be for a b to fit."""
+        if a.op == "neg":
+            a = a.args[0]
+        partner = None if b.constant is not None else self._of(b)
+        if a.op == "variable" and e is not None and partner is not None:
+            self.wants.setdefault(a.data, []).append(e - partner - BITS)
+
+
+LEAVES = ("element", "field", "read", "variable")
+
+
+class _Statements:
+    def __init__(self, context: Context, done: dict[str, Function]) -> None:
+        self.c = context
+        self.f = context.function
+        self.x = Expressions(context)
+        self.done = done
+        self.ties: dict[str, Cell] = {}
+
+    def function(self) -> Function:
+        self._ties()
+        Plan(self.c, self.x, self.ties, self.exponent, self.target).run(self.f.body)
+        body = _tidied(alive(self.block(self.f.body)))
+        arguments = self.f.arguments
+        if self.f.private:
+            arguments = [*arguments, STATUS]
+        return replace(self.f, body=body, arguments=arguments)
+
+    def _ties(self) -> None:
+        """Locals that are stored as they are take the format of where they go."""
+        for s in walk(self.f.body):
+            if isinstance(s, Store | Assign) and s.node.op == "variable" and s.node.kind == "real":
+                self.ties.setdefault(s.node.data, self.target(s))
+
+    def target(self, s: Store | Assign) -> Cell:
+        if s.index is None:
+            if isinstance(s, Assign):
+                return ("variable", self.f.name, s.name)
+            return number_of(self.f, s.name)
+        return self.c.arrays.element(array_of(self.f, s.name), affine(s.index)[0])
+
+    def exponent(self, cell: Cell) -> int:
+        e = self.c.formats.of(cell)
+        return -self.c.formats.bits if e is None else e
+
+    def block(self, body: list[Statement]) -> list[Statement]:
+        out: list[Statement] = []
+        for s in body:
+            out += self.statement(s)
+        return _tidied(out)
+
+    def statement(self, s: Statement) -> list[Statement]:
+        match s:
+            case Section():
+                return [s]
+            case Let():
+                return self.let(s)
+            case Declare(name=name, value=value):
+                if value is None:
+                    return [s]
+                if value.kind != "real":
+                    return [replace(s, value=self.x.index(value))]
+                e = self.exponent(("variable", self.f.name, name))
+                return [replace(s, value=self.x.value(value, e).node)]
+            case Assign() | Store():
+                return [self.store(s)]
+            case Guard(condition=condition, before=before):
+                test = self.x.index(condition)
+                if test.constant == 0:
+                    return []
+                return [replace(s, condition=test, before=[self.store(b) for b in before])]  # type: ignore[misc]
+            case Flag(condition=condition):
+                test = self.x.index(condition)
+                return [] if test.constant == 0 else [replace(s, condition=test)]
+            case If(condition=condition, body=body):
+                test = self.x.index(condition)
+                if test.constant is not None:
+                    return self.block(body) if test.constant else []
+                return [If(test, self.block(body))]
+            case For(start=start, stop=stop, body=body):
+                return [replace(s, start=self.x.index(start), stop=self.x.index(stop), body=self.block(body))]
+            case Call():
+                return [self.call(s)]
+
+    def let(self, s: Let) -> list[Statement]:
+        node, name = s.node, s.name
+        if node.kind != "real":
+            value = self.x.index(node)
+            if value.constant is not None:
+                self.c.known[name] = value
+                return []
+            return [Let(value, name)]
+        out = self.inverse(s)
+        if out is not None:
+            return out
+        if node.op in ("element", "field", "read", "variable"):
+            raw = self.x.value(node)
+        else:
+            e = self.exponent(self.ties[name]) if name in self.ties else self.c.planned.get(name)
+            if e is not None and name in self.ties:
+                least = self.c.formats.node(node, 0)
+                e = None if least is not None and least > e else e
+            if name not in self.ties and (node.op == "mul" or (node.op == "sum" and e is not None)):
+                e = self.x.useful(node, e)
+            if name not in self.ties and node.op == "mul":
+                e = self.x.roomier(node, e)
+            raw = self.x.value(node, e)
+            if not self.outside(name):
+                raw = self.x.fit(raw)
+        if raw.node.constant is not None:
+            self.c.locals[name] = raw
+            return []
+        self.c.locals[name] = replace(raw, node=make("variable", (), name))
+        return [Let(raw.node, name)]
+
+    def outside(self, name: str) -> bool:
+        """Whether a local is stored where the user sees it, with all 31 bits."""
+        return name in self.ties and self._is_outside(self.ties[name])
+
+    def _is_outside(self, cell: Cell) -> bool:
+        if cell[1] in ("kf.x", "kf.nis", "kf.log_likelihood"):
+            return True
+        return cell[0] == "array" and cell[2] in ("P", "S", "Q", "R") and not self.f.private
+
+    def inverse(self, s: Let) -> list[Statement] | None:
+        """A reciprocal whose size varies much is not kept: every quotient is divided."""
+        node, condition = s.node, None
+        if node.op == "select" and node.args[2].constant == 0:
+            condition, node = node.args[0], node.args[1]
+        if node.op != "div" or node.args[0].constant is None:
+            return None
+        ranges = self.c.formats.ranges
+        largest, smallest = ranges.largest(node), ranges.smallest(node)
+        if node.args[0].constant != 1:
+            return None
+        if self.c.formats.more:  # the runs may not have met the smallest divisor
+            if self.x.value(node.args[1]).low > 0 and largest <= DYNAMIC * smallest:
+                return None
+        elif largest == 0 or largest <= DYNAMIC * smallest:
+            return None
+        test = None if condition is None else self.x.index(condition)
+        out: list[Statement] = []
+        if test is not None and test.op not in ("variable",):
+            name = f"{s.name}_some"
+            out.append(Let(test, name))
+            test = make("variable", (), name, "bool")
+        den = self.x.value(node.args[1])
+        if den.node.op not in ("variable", "element", "field"):
+            name = f"{s.name}_of"
+            out.append(Let(den.node, name))
+            den = replace(den, node=make("variable", (), name))
+        self.c.inverses[s.name] = (den, test)
+        self.c.known[f"1/{s.name}"] = node
+        return out
+
+    def store(self, s: Store | Assign) -> Store | Assign:
+        index = None if s.index is None else self.x.index(s.index)
+        if s.node.kind != "real":
+            return replace(s, index=index, node=self.x.index(s.node))
+        raw = self.x.value(s.node, self.exponent(self.target(s)))
+        if not self._is_outside(self.target(s)):
+            raw = self.x.fit(raw)
+        node = raw.node
+        if isinstance(s, Store) and raw.low < 0 and s.index is not None and is_variance(s.name, s.index):
+            node = make("q_max", (node, constant(0)))
+        return replace(s, index=index, node=node)
+
+    def call(self, s: Call) -> Call:
+        args: list[str | Slice | Node] = []
+        for argument, given in zip(s.callee.arguments, s.args, strict=True):
+            if isinstance(given, Slice):
+                args.append(replace(given, offset=self.x.index(given.offset)))
+            elif isinstance(given, Node):
+                e = self.exponent(number_of(s.callee, argument.name))
+                args.append(self.x.value(given, e).node)
+            else:
+                args.append(given)
+        args.append("flags" if self.f.private else "&flags")
+        return Call(self.done[s.callee.name], args)
+
+
+def alive(body: list[Statement]) -> list[Statement]:
+    """Without locals that nobody reads, as those of guards that have vanished."""
+    while True:
+        used: set[str] = set()
+        for s in walk(body):
+            stack = list(roots(s))
+            while stack:
+                node = stack.pop()
+                if node.op == "variable":
+                    used.add(node.data)
+                stack += node.args
+        kept, dropped = _without(body, used)
+        if not dropped:
+            return kept
+        body = kept
+
+
+def _without(body: list[Statement], used: set[str]) -> tuple[list[Statement], bool]:
+    out: list[Statement] = []
+    dropped = False
+    for s in body:
+        if isinstance(s, Let) and s.name not in used:
+            dropped = True
+            continue
+        if isinstance(s, For | If):
+            inner, gone = _without(s.body, used)
+            dropped |= gone
+            s = replace(s, body=inner)
+        out.append(s)
+    return out, dropped
+
+
+def _tidied(body: list[Statement]) -> list[Statement]:
+    """Without headings of nothing."""
+    kept: list[Statement] = []
+    for s in body:
+        if isinstance(s, Section) and kept and isinstance(kept[-1], Section):
+            kept.pop()
+        kept.append(s)
+    if kept and isinstance(kept[-1], Section):
+        kept.pop()
+    return kept

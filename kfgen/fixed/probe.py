@@ -1,0 +1,158 @@
+"""A short run of the integers beside the real numbers: whether what was chosen carries the filter."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from kfgen.filters.base import FilterCode
+from kfgen.fixed.cells import Arrays, Cell
+from kfgen.fixed.formats import Formats
+from kfgen.fixed.real import Memory, Ranges, RealProgram, Source
+from kfgen.fixed.runs import Columns, blank
+from kfgen.fixed.scalar import Fixed
+from kfgen.ir.nodes import Node
+from kfgen.ir.program import Function
+
+ERRORS = ("NOT_FINITE", "NOT_POSITIVE")
+
+
+class _IntegerSource(Source):
+    """Integer programs are run as they are; every operation is the scalar's own."""
+
+    def record(self, key: Any, value: str, small: bool = False) -> None:
+        pass
+
+    def value(self, node: Node) -> str:
+        match node.op:
+            case "const" if node.kind == "real":
+                return str(int(node.data))
+            case "lookup":
+                return f"{self.program.numbers(node.data.numbers)}[{self.value(node.args[0])}]"
+        return super().value(node)
+
+    def integral(self, node: Node, args: list[str]) -> str:
+        if node.op == "segment":
+            return self.evaluated(node, args)
+        return super().integral(node, args)
+
+    def operation(self, node: Node, args: list[str]) -> str:
+        infix = {"add": "+", "sub": "-", "mul": "*"}.get(node.op)
+        if infix:
+            return f"({args[0]} {infix} {args[1]})"
+        return f"(-{args[0]})" if node.op == "neg" else self.evaluated(node, args)
+
+    def evaluated(self, node: Node, args: list[str]) -> str:
+        return self.new(f"E({node.op!r}, {self.program.data(node.data)}, [{', '.join(args)}])")
+
+
+class IntegerProgram(RealProgram):
+    """The functions of an integer filter on Python integers."""
+
+    def __init__(self, functions: list[Function], arrays: Arrays, scalar: Fixed) -> None:
+        self.scalar = scalar
+        super().__init__(functions, arrays, Ranges(), _IntegerSource, {"E": scalar.evaluate})
+
+    def data(self, data: object) -> str:
+        if data is None or isinstance(data, tuple):
+            return repr(data)
+        return self.bound(data)
+
+    def numbers(self, numbers: tuple[Any, ...]) -> str:
+        return self.bound([int(v) for v in numbers])
+
+
+@dataclass(frozen=True)
+class Departure:
+    """The largest error of the integers: of which state, in standard deviations, and after which row."""
+
+    state: int
+    sigmas: float
+    row: int
+    errors: int  # calls that only the integers refused
+
+
+def probe(real: RealProgram, code: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed, log: Columns,
+          rows: int) -> Departure:  # fmt: skip
+    """Run both over a log, each from its own init."""
+    program = IntegerProgram(list(integer.functions), formats.arrays, scalar)
+    return _Probe(real, program, code, formats).run(log, rows)
+
+
+class _Probe:
+    def __init__(self, real: RealProgram, integer: IntegerProgram, code: FilterCode, formats: Formats) -> None:
+        self.real = real
+        self.integer = integer
+        self.code = code
+        self.spec = code.model.spec
+        self.formats = formats
+        self.a = blank(code)
+        self.b = _integers(blank(code))
+        self.refused = 0
+
+    def raw(self, cell: Cell, value: float) -> int:
+        scaled = math.floor(math.ldexp(value, -self.formats.fixed[cell]) + 0.5)
+        return max(-(2**31), min(2**31 - 1, scaled))
+
+    def give(self, cell: Cell, path: str, value: float) -> None:
+        """The same number to both: what the integers can carry."""
+        raw = self.raw(cell, value)
+        self.b.numbers[path] = raw
+        self.a.numbers[path] = math.ldexp(raw, self.formats.fixed[cell])
+
+    def call(self, function: str) -> None:
+        one, two = self.real.run(function, self.a), self.integer.run(function, self.b)
+        self.refused += two in ERRORS and one not in ERRORS
+
+    def run(self, log: Columns, rows: int) -> Departure:
+        self.call("init")
+        n = len(self.code.model.states)
+        run_time = self.spec.dt is not None and self.spec.dt.run_time
+        worst = Departure(0, 0.0, 0, 0)
+        for k in range(rows):
+            for each in self.spec.inputs:
+                self.give(("number", f"u.{each.name}"), f"u.{each.name}", float(log[each.name][k]))
+            step = float(log["t"][k]) - float(log["t"][k - 1]) if run_time and k else 0.0
+            if run_time:
+                self.give(("number", "dt"), "dt", step)
+            if not run_time or step != 0:
+                self.call("predict")
+            for sensor in self.spec.measurements:
+                columns = [log.get(f"{sensor.name}.{c.name}") for c in sensor.components]
+                values = [math.nan if c is None else float(c[k]) for c in columns]
+                if any(map(math.isnan, values)):
+                    continue
+                for c, v in zip(sensor.components, values, strict=True):
+                    self.give(("number", f"update_{sensor.name}", f"z.{c.name}"), f"z.{c.name}", v)
+                self.call(f"update_{sensor.name}")
+            state, sigmas = self._error(n)
+            if not sigmas <= worst.sigmas:
+                worst = Departure(state, sigmas, k, 0)
+        return Departure(worst.state, worst.sigmas, worst.row, self.refused)
+
+    def _error(self, n: int) -> tuple[int, float]:
+        variances = [math.inf] * n
+        if any(f.name == "get_covariance" for f in self.code.functions):
+            self.real.run("get_covariance", self.a)
+            variances = [self.a.arrays["P"][i * n + i] for i in range(n)]
+        worst = (0, 0.0)
+        for i in range(n):
+            e = self.formats.fixed[self.formats.arrays.element(("array", "kf.x"), i)]
+            error = abs(self.a.arrays["kf.x"][i] - math.ldexp(self.b.arrays["kf.x"][i], e))
+            period = self.code.model.periods[i]
+            if period is not None:
+                error = abs(math.remainder(error, float(period)))
+            error = max(0.0, error - math.ldexp(4.0, e))
+            sigma = math.sqrt(max(variances[i], 0.0))
+            ratio = error / sigma if sigma > 1e-9 * (1e-300 + abs(self.a.arrays["kf.x"][i])) else 0.0
+            if not ratio <= worst[1]:
+                worst = (i, ratio)
+        return worst
+
+
+def _integers(memory: Memory) -> Memory:
+    return Memory(
+        {name: [0] * len(values) for name, values in memory.arrays.items()},
+        {name: value if isinstance(value, bool) else 0 for name, value in memory.numbers.items()},
+    )

@@ -1,0 +1,159 @@
+"""The real program over logs: nominal ones, and bad weather."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from kfgen.filters.base import FilterCode
+from kfgen.fixed.real import Memory, Ranges, RealProgram
+
+Columns = Mapping[str, Sequence[float]]
+CORRELATED = 75  # rows between two covariances that are given
+OUTAGE = 60  # rows without any reading
+EVERY = 16  # rows between two calls of the functions that a run does not need
+
+
+def blank(code: FilterCode) -> Memory:
+    """The filter's fields, and the arguments that its functions may be given, all zero."""
+    memory = Memory()
+    for block in code.blocks:
+        if block.size is None:
+            memory.numbers[f"kf.{block.name}"] = {"real": 0.0, "uint32": 0, "bool": False}[block.kind]
+        else:
+            memory.arrays[f"kf.{block.name}"] = [0.0] * block.size
+    n = len(code.model.states)
+    for f in code.functions:
+        for a in f.arguments:
+            if a.size is not None and not f.private:
+                memory.arrays[a.name] = [0.0] * max(a.size, n)
+    return memory
+
+
+class Runner:
+    """Runs the filter over the rows of logs and records the ranges of all that it computes."""
+
+    def __init__(self, code: FilterCode, program: RealProgram, ranges: Ranges) -> None:
+        self.code = code
+        self.program = program
+        self.ranges = ranges
+        self.spec = code.model.spec
+        self.names = {f.name for f in code.functions}
+        self.run_time = self.spec.dt is not None and self.spec.dt.run_time
+        self.statuses: dict[str, int] = {}
+
+    def call(self, function: str, memory: Memory) -> str:
+        status = self.program.run(function, memory)
+        self.statuses[status] = self.statuses.get(status, 0) + 1
+        return status
+
+    def run(self, log: Columns, rows: int, correlation: float = 0.0, every: int = 1) -> Memory:
+        """A whole log, as `kfgen run` would: predict, then the updates in the spec's order.
+
+        correlation: the states are given this one now and then, so that no part of a covariance is taken for zero
+        only because the first one is diagonal. every: rows from one reading of a sensor to the next; beyond 1 there
+        is a gap of OUTAGE rows as well.
+        """
+        memory = blank(self.code)
+        self.call("init", memory)
+        self._look(memory)
+        for k in range(rows):
+            if correlation and k % CORRELATED == 0:
+                self._correlate(memory, correlation)
+            self._inputs(memory, log, k)
+            if self._step(memory, log, k):
+                self.call("predict", memory)
+                self._look(memory)
+            for place, sensor in enumerate(self.spec.measurements):
+                if every == 1 or ((k + place) % every == 0 and not rows < 2 * k < rows + 2 * OUTAGE):
+                    self._update(memory, sensor, log, k)
+            if k % EVERY == 0 or k == rows - 1:
+                self._others(memory, k)
+        return memory
+
+    def _correlate(self, memory: Memory, correlation: float) -> None:
+        if "get_covariance" not in self.names:
+            return
+        n = len(self.code.model.states)
+        self.call("get_covariance", memory)
+        P = memory.arrays["P"]
+        root = [math.sqrt(max(P[i * n + i], 0.0)) for i in range(n)]
+        sign = [1 if i % 2 or correlation > 0 else -1 for i in range(n)]
+        memory.arrays["P"] = [
+            root[i] * root[j] * (1.0 if i == j else abs(correlation) * sign[i] * sign[j])
+            for i in range(n) for j in range(n)
+        ]  # fmt: skip
+        self.call("set_covariance", memory)
+        self._look(memory)
+
+    def _inputs(self, memory: Memory, log: Columns, k: int) -> None:
+        for each in self.spec.inputs:
+            value = float(log[each.name][k])
+            if not math.isnan(value):
+                memory.numbers[f"u.{each.name}"] = value
+                self.ranges.see(("number", f"u.{each.name}"), value)
+
+    def _step(self, memory: Memory, log: Columns, k: int) -> bool:
+        if not self.run_time:
+            return True
+        step = float(log["t"][k]) - float(log["t"][k - 1]) if k else 0.0
+        memory.numbers["dt"] = step
+        self.ranges.see(("number", "dt"), step)
+        return step != 0
+
+    def _update(self, memory: Memory, sensor: Any, log: Columns, k: int) -> None:
+        values = []
+        for c in sensor.components:
+            column = log.get(f"{sensor.name}.{c.name}")
+            values.append(math.nan if column is None else float(column[k]))
+        there = [not math.isnan(v) for v in values]
+        if not any(there):
+            return
+        name = f"update_{sensor.name}"
+        for c, v, known in zip(sensor.components, values, there, strict=True):
+            memory.numbers[f"z.{c.name}"] = v if known else 0.0
+            if known:
+                self.ranges.see(("number", name, f"z.{c.name}"), v)
+        if all(there):
+            if sensor.partial:
+                other = memory.copy()
+                other.numbers["mask"] = 1 + k % ((1 << len(values)) - 1)
+                self.call(f"{name}_masked", other)
+            self.call(name, memory)
+        elif sensor.partial:
+            memory.numbers["mask"] = sum(1 << i for i, known in enumerate(there) if known)
+            self.call(f"{name}_masked", memory)
+        self._look(memory)
+
+    def _look(self, memory: Memory) -> None:
+        """What the fields hold, whoever has stored it."""
+        for block in self.code.blocks:
+            if block.kind != "real":
+                continue
+            key = ("array", f"kf.{block.name}")
+            if block.size is None:
+                self.ranges.see(("number", f"kf.{block.name}"), memory.numbers[f"kf.{block.name}"])
+                continue
+            for i, value in enumerate(memory.arrays[f"kf.{block.name}"]):
+                self.ranges.see(self.program.arrays.element(key, i), value)
+
+    def _others(self, memory: Memory, k: int) -> None:
+        """Covariance and state out and in again, on copies."""
+        other = memory.copy()
+        if "get_covariance" in self.names:
+            self.call("get_covariance", other)
+            P = list(other.arrays["P"])
+            n = len(self.code.model.states)
+            for part in (P, [p if i % (n + 1) == 0 else 0.5 * p for i, p in enumerate(P)]):
+                other.arrays["P"] = list(part)
+                self.call("set_covariance", other)
+            if "set_sqrt_covariance" in self.names:
+                self.call("get_sqrt_covariance", other)
+                self.call("set_sqrt_covariance", other)
+        other = memory.copy()
+        for name in sorted(self.names):
+            if name == "redraw" or (name.startswith("get_") and name not in ("get_covariance", "get_sqrt_covariance")):
+                self.call(name, other)
+        other.arrays["x"] = list(other.arrays["kf.x"])
+        self.call("set_state", other)

@@ -1,0 +1,111 @@
+"""q<m>.<n> as a scalar type: how integers are spelled, and what its operations give, bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+from kfgen.fixed import arithmetic
+from kfgen.fixed.arithmetic import Status
+from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
+
+PREFIX = "q_"
+INSIDE = 2**30 - 1
+
+
+class Fixed:
+    """int32_t, every value with a binary point of its own, which the program knows and the number does not."""
+
+    helpers = "helpers_q.j2"
+    helper_ops = frozenset({"segment"})
+    silent_ops = frozenset({"q_abs", "q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far"}) | {
+        f"q_{name}" for name in WITHOUT_STATUS
+    }
+    c_type = "int32_t"
+    size = 4
+    epsilon = Fraction(1, 2**26)
+    smallest = Fraction(0)
+
+    def __init__(self, name: str, rounding: str = arithmetic.NEAREST) -> None:
+        self.name = name
+        self.bits = int(name.partition(".")[2])
+        self.rounding = rounding
+        self.status = Status()
+
+    def literal(self, value: Fraction) -> str:
+        assert value.denominator == 1, "a constant of the integer program"
+        return "INT32_MIN" if value == -(2**31) else str(int(value))
+
+    def nearest(self, value: Fraction) -> Fraction:
+        return value
+
+    def function(self, op: str) -> str:
+        return op
+
+    def convert(self, value: Any) -> Any:
+        return int(value)
+
+    def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
+        if op.startswith(PREFIX):
+            name = op.removeprefix(PREFIX)
+            if op in ("q_fma", "q_far"):
+                c, a, b = args
+                assert max(abs(a), abs(b)) <= INSIDE, "factors that were proved to be small are not"
+                return self._proved(c + arithmetic.scale(a * b, data[0], self.rounding))
+            if op == "q_mac":
+                return self._mac(args, data[0])
+            if op == "q_fit":
+                if abs(args[0]) > INSIDE:
+                    self.status.saturate()
+                return max(-INSIDE, min(INSIDE, args[0]))
+            if op in _OPERATIONS:
+                return _OPERATIONS[op](data, *args)
+            given = [*args, *(data or ())]
+            if name in _ROUNDED:
+                return TWINS[name](*given, self.status, self.rounding)
+            if name in WITHOUT_STATUS:
+                return TWINS[name](*given)
+            return TWINS[name](*given, self.status)
+        value = _OPERATIONS[op](data, *args)
+        return value if isinstance(value, bool) else self._proved(value)
+
+    def _mac(self, args: list[int], s: int) -> int:
+        """c + a b / 2^s: the product clipped where it is beyond 2^30, then the sum."""
+        assert max(map(abs, args)) <= INSIDE
+        c, a, b = args
+        product = a * b
+        if -(1 << (s + 30)) <= product < 1 << (s + 30):
+            total = c + arithmetic.scale(product, s, self.rounding)
+        else:
+            self.status.saturate()
+            total = c + (INSIDE if product > 0 else -INSIDE)
+        if abs(total) > INSIDE:
+            self.status.saturate()
+        return max(-INSIDE, min(INSIDE, total))
+
+    def _proved(self, value: int) -> int:
+        if not -(2**31) <= value < 2**31:
+            raise OverflowError("a value that was proved to fit does not")
+        return value
+
+
+_ROUNDED = {"mul", "madd", "shift", "narrow"}
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "add": lambda d, a, b: a + b,
+    "sub": lambda d, a, b: a - b,
+    "mul": lambda d, a, b: a * b,
+    "neg": lambda d, a: -a,
+    "lt": lambda d, a, b: a < b,
+    "le": lambda d, a, b: a <= b,
+    "not": lambda d, a: not a,
+    "segment": lambda d, a: sum(1 for v in d.x if v <= a),
+    "table_x": lambda d, i: int(d.starts()[i]),
+    "table_y": lambda d, i: int(d.values()[i]),
+    "table_slope": lambda d, i: int(d.slopes()[i]),
+    "q_min": lambda d, a, b: min(a, b),
+    "q_max": lambda d, a, b: max(a, b),
+    "q_sign": lambda d, a: (a > 0) - (a < 0),
+    "q_abs": lambda d, a: abs(a),
+    "q_count": lambda d, a: min(a, 2**31 - 1),
+}

@@ -1,0 +1,39 @@
+"""The Python routine of each C routine that code calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from kfgen.fixed import arithmetic as basic
+from kfgen.fixed import functions_circular as circular
+from kfgen.fixed import functions_exponential as exponential
+
+TWINS: dict[str, Callable[..., int]] = {
+    "narrow": basic.narrow,
+    "mul": basic.mul,
+    "madd": basic.madd,
+    "add": basic.add,
+    "sub": basic.sub,
+    "shift": basic.shift,
+    "div": basic.div,
+    "reciprocal": basic.reciprocal,
+    "sqrt": basic.sqrt,
+    "floor": basic.floor,
+    "wrap": basic.wrap,
+    "hypot": basic.hypot,
+    "sin": circular.sin,
+    "cos": circular.cos,
+    "atan": circular.atan,
+    "atan2": circular.atan2,
+    "tan": circular.tan,
+    "asin": circular.asin,
+    "acos": circular.acos,
+    "exp": exponential.exp,
+    "log": exponential.log,
+    "sinh": exponential.sinh,
+    "cosh": exponential.cosh,
+    "tanh": exponential.tanh,
+    "pow": exponential.pow,
+}
+"""name -> function; the arguments are those of the C routine, `status` last where it has one."""
+WITHOUT_STATUS = frozenset({"madd", "floor", "atan2"})
