@@ -64,23 +64,28 @@ def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCod
 
 def _unrolled_or_not(model: Model, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
     """The filter in straight-line code or in loops, as `code` asks."""
-    chosen = model.spec.code
-    layout = _layout(model, scalar)
+    chosen, layout = model.spec.code, _layout(model, scalar)
 
-    def emitted(layout: Layout) -> FilterCode:
-        return _FILTERS[model.spec.filter.type](model, layout, scalar).code(taken)
+    def emitted(unroll: str) -> FilterCode:
+        asked = replace(model, spec=replace(model.spec, code=replace(chosen, unroll=unroll)))
+        own = _rolled(model, layout, scalar, taken) if unroll == "none" else layout
+        by_points = model.spec.filter.type == "ukf"
+        filter_ = _FILTERS[model.spec.filter.type](asked, layout if by_points else own, scalar)
+        filter_.plain = own
+        code = filter_.code(taken)
+        return replace(code, constants={**code.constants, **own.tables})
 
-    if chosen.unroll == "full" or (chosen.unroll == "auto" and chosen.flash is None):
-        return emitted(layout)
-    looped = emitted(_rolled(model, layout, scalar, taken))
     if chosen.flash is None:
-        return told(looped, lambda name: True)
-    return choose(emitted(layout) if chosen.unroll == "auto" else looped, looped, chosen.flash)
+        code = emitted(chosen.unroll)
+        return told(code, {f.name for f in code.functions}) if chosen.unroll == "none" else code
+    straight = emitted(chosen.unroll)
+    looped = emitted("none") if chosen.unroll == "auto" else straight
+    return choose(straight, looped, chosen.flash, chosen.unroll == "none")
 
 
 def _rolled(model: Model, layout: Layout, scalar: Scalar, taken: frozenset[str]) -> Layout:
     """The same layout in loops; where there is nothing to loop over, as it is."""
-    if layout.n == 1 or model.spec.filter.type == "ukf":
+    if layout.n == 1:
         return layout
     names = [model.states[i] for i in layout.order]
     kernels = Kernels(scalar.smallest, taken)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
-from kfgen.ir.program import Call, Function, walk
+from kfgen.ir.program import Call, For, Function, walk
 from kfgen.ir.size import predicted_flash
 
 MARGIN = 1.25  # what a prediction may be wrong by: within it a choice still fits
@@ -20,14 +20,14 @@ LOOPING = (
 )
 
 
-def choose(straight: FilterCode, looped: FilterCode, budget: int) -> FilterCode:
+def choose(straight: FilterCode, looped: FilterCode, budget: int, loops: bool = False) -> FilterCode:
     """The functions of two forms of a filter, loops where straight-line code would exceed the budget in bytes.
 
-    Those that save most become loops first; none does that saves nothing. Raises SpecError where even the smallest
-    choice is predicted to exceed the budget.
+    Those that save most become loops first; none does that saves nothing. loops: all of them are. Raises SpecError
+    where even the smallest choice is predicted to exceed the budget.
     """
     names = [f.name for f in straight.functions if _counted(f)]
-    rolled: set[str] = set()
+    rolled: set[str] = set(names) if loops else set()
     while _flash(_mixed(straight, looped, rolled)) * MARGIN > budget:
         found = _flash(_mixed(straight, looped, rolled))
         sizes = {name: _flash(_mixed(straight, looped, rolled | {name})) for name in names if name not in rolled}
@@ -51,11 +51,14 @@ def choose(straight: FilterCode, looped: FilterCode, budget: int) -> FilterCode:
     return code
 
 
-def told(code: FilterCode, rolled: Callable[[str], bool]) -> FilterCode:
-    """With what was chosen for each function, for the build's table, and the compiler's flags for it."""
-    forms = {f.name: LOOPS if rolled(f.name) else STRAIGHT for f in code.functions if _counted(f)}
-    notes = LOOPING if set(forms.values()) == {LOOPS} else code.notes
-    return replace(code, forms=forms, notes=notes)
+def told(code: FilterCode, rolled: Collection[str]) -> FilterCode:
+    """With the form of each function, for the build's table, and the compiler's flags for it. rolled: what was to
+    become loops, where there is something to loop over."""
+    forms = {
+        f.name: LOOPS if f.name in rolled and any(isinstance(s, For) for s in walk(f.body)) else STRAIGHT
+        for f in code.functions if _counted(f)
+    }  # fmt: skip
+    return replace(code, forms=forms, notes=LOOPING if set(forms.values()) == {LOOPS} else code.notes)
 
 
 def with_privates(code: FilterCode) -> FilterCode:
@@ -65,7 +68,7 @@ def with_privates(code: FilterCode) -> FilterCode:
     def add(function: Function) -> None:
         for callee in _callees(function):
             add(callee)
-        if all(function is not known for known in out):
+        if function.name not in {known.name for known in out}:
             out.append(function)
 
     for function in code.functions:
@@ -78,7 +81,7 @@ def _mixed(straight: FilterCode, looped: FilterCode, rolled: set[str]) -> Filter
     other = {f.name: f for f in looped.functions}
     functions = tuple(other[f.name] if f.name in rolled else f for f in straight.functions if not f.private)
     constants = {**straight.constants, **looped.constants} if rolled else straight.constants
-    return told(replace(straight, functions=functions, constants=constants), rolled.__contains__)
+    return told(replace(straight, functions=functions, constants=constants), rolled)
 
 
 def _flash(code: FilterCode) -> int:

@@ -79,6 +79,7 @@ class Ekf:
     def __init__(self, model: Model, layout: Layout, scalar: Scalar) -> None:
         self.model = model
         self.layout = layout
+        self.plain = layout  # for what a filter by sigma points does without them
         self.order = order = layout.order
         self.scalar = scalar
         self.names = [model.states[i] for i in order]

@@ -6,6 +6,8 @@ update: see `unscented`; a linear h needs no points, and the update is then that
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 
 from kfgen.filters import cloud, guards, process, rolled
@@ -119,7 +121,8 @@ class Ukf(Ekf):
     def predicting(self, t: Trace, step: Step) -> Phases:
         """Points through f; x <- their mean, P <- their spread + Q + G Qw G^T of the noises that they do not carry."""
         if self.simple:
-            yield from super().predicting(t, step)
+            with self._without_points():
+                yield from super().predicting(t, step)
             return
         model = self.model
         prior = process.given(t, model, step)
@@ -153,7 +156,8 @@ class Ukf(Ekf):
     @property
     def loops(self) -> bool:
         """Whether loops do what grows with the square of the states."""
-        many = self.n >= rolled.FROM and self.model.spec.code.unroll != "full"
+        unroll = self.model.spec.code.unroll
+        many = unroll == "none" or (self.n >= rolled.FROM and unroll != "full")
         return many and not self.own and self.set.extra >= 0
 
     @property
@@ -328,9 +332,22 @@ class Ukf(Ekf):
         chosen = self.model.spec.filter
         several = len(sensor.h) > 1 and self.model.options.innovation_floor is not None
         whole = not chosen.sequential and (chosen.adaptive is not None or several)
-        if chosen.sequential or (seeing.linear and not whole):
-            return super().updating(t, sensor, used)
-        return whole_vector(self, seeing, t, sensor, used)
+        if seeing.linear and not whole:
+            with self._without_points():
+                yield from super().updating(t, sensor, used)
+        elif chosen.sequential:
+            yield from super().updating(t, sensor, used)
+        else:
+            yield from whole_vector(self, seeing, t, sensor, used)
+
+    @contextmanager
+    def _without_points(self) -> Iterator[None]:
+        """What is linear needs only what an ekf needs of a layout."""
+        points, self.layout = self.layout, self.plain
+        try:
+            yield
+        finally:
+            self.layout = points
 
     def skipped(self, sensor: SensorModel) -> tuple[str, ...]:
         return self.seeing[sensor.name].carried

@@ -1,0 +1,121 @@
+"""`unroll` within `flash`: which functions become loops, what is told of it, and what does not fit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from emitted import problems
+from variants import call
+
+from kfgen.commands.build import Built, table
+from kfgen.errors import SpecError
+from kfgen.generate import Generated, build
+from kfgen.ir.program import Call, walk
+from kfgen.ir.size import predicted_flash
+from kfgen.native import load_filters
+from kfgen.override import override
+from kfgen.reference import reference
+from kfgen.simulate import simulate
+from kfgen.spec import loads
+from kfgen.spec.types import Spec
+
+MARGIN = 1.25
+
+
+def chain(n: int, unroll: str = "auto", flash: int | None = None, **filter_: str) -> Spec:
+    spec = override(loads(problems.chain(n)), "float", **({"filter": filter_} if filter_ else {}))
+    return replace(spec, code=replace(spec.code, unroll=unroll, flash=flash))
+
+
+def flash(made: Generated) -> int:
+    return sum(predicted_flash(f) for f in made.code.functions)
+
+
+def test_without_a_budget_nothing_changes():
+    straight = build(chain(8, "full")).files
+    assert build(chain(8)).files == straight
+    assert build(chain(8, "auto", 1 << 20)).files == straight
+    assert build(chain(8)).summary.forms == {}
+
+
+def test_every_budget_is_kept():
+    """From what loops need to what straight-line code needs: the larger it is, the less becomes loops."""
+    least, most = flash(build(chain(8, "none"))), flash(build(chain(8, "full")))
+    assert MARGIN * least < most
+    seen = []
+    for budget in np.linspace(MARGIN * least, MARGIN * most, 6).astype(int) + 1:
+        made = build(chain(8, "auto", int(budget)))
+        assert MARGIN * flash(made) <= budget
+        seen.append(sorted(made.summary.forms.items()))
+    both = [("predict", "loops"), ("update_position", "loops")]
+    assert seen[0] == both
+    assert seen[-1] == [(name, "unrolled") for name, _ in both]
+    assert [("predict", "loops"), ("update_position", "unrolled")] in seen
+    loops = [sum(form == "loops" for _, form in each) for each in seen]
+    assert loops == sorted(loops, reverse=True)
+
+
+def test_a_mixed_filter_computes_the_right_thing():
+    spec = chain(8, "auto", 4500, covariance="ud", update="bierman")
+    made = build(spec)
+    assert made.summary.forms == {"predict": "loops", "update_position": "unrolled"}
+    names = [f.name for f in made.code.functions]
+    called = {s.callee.name for f in made.code.functions for s in walk(f.body) if isinstance(s, Call)}
+    assert called == {f.name for f in made.code.functions if f.private}
+    assert len(set(names)) == len(names)
+    kf, ref = load_filters([(spec, made.files)])[0], reference(spec)
+    log = simulate(spec, 15, 2)
+    for row in range(15):
+        z = [log.columns[f"position.{name}"][row] for name in ("z1", "z3")]
+        for name, arguments in (("predict", {}), ("position", {"z": z})):
+            assert call(kf, name, arguments) == call(ref, name, arguments) == 0
+    np.testing.assert_allclose(kf.P, ref.P, rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("unroll", ["none", "auto", "full"])
+def test_what_does_not_fit_is_told(unroll):
+    with pytest.raises(SpecError) as caught:
+        build(chain(8, unroll, 1500))
+    (mistake,) = caught.value.mistakes
+    found = re.search(r"(\d+) bytes of flash are predicted, (\d+) more than the budget \((.*)\)", mistake.message)
+    assert found is not None
+    parts = [int(part.rsplit(" ", 1)[1]) for part in found[3].split(", ")]
+    assert int(found[1]) == sum(parts) == 1500 + int(found[2])
+    assert flash(build(chain(8, "full" if unroll == "full" else "none"))) == sum(parts)
+
+
+def test_the_table_tells_the_forms(tmp_path):
+    spec = chain(8, "auto", 4500, covariance="ud", update="bierman")
+    text = table([Built(spec, build(spec), tmp_path)])
+    assert "predict: loops" in text
+    assert "update_position: unrolled" in text
+    assert "loops" not in table([Built(chain(8), build(chain(8)), tmp_path)])
+
+
+def test_a_single_state_has_nothing_to_loop_over():
+    spec = loads(problems.ALL["six_sensors"])
+    made = build(replace(spec, code=replace(spec.code, unroll="none")))
+    assert set(made.summary.forms.values()) == {"unrolled"}
+
+
+@pytest.mark.parametrize("covariance", ["full", "ud", "sqrt"])
+def test_unscented_filters(covariance):
+    """Points in loops from two states on, linear parts as in an ekf."""
+    text = problems.chain(4).replace("type: ekf", f"type: ukf, covariance: {covariance}")
+    spec = loads(text)
+    looped, straight = (
+        replace(spec, name=name, code=replace(spec.code, unroll=unroll))
+        for name, unroll in (("looped", "none"), ("straight", "full"))
+    )
+    made = [build(spec) for spec in (looped, straight)]
+    assert flash(made[0]) < flash(made[1])
+    assert set(made[0].summary.forms.values()) == {"loops"}
+    a, b = load_filters([(spec, each.files) for spec, each in zip((looped, straight), made, strict=True)])
+    for k in range(20):
+        for name, arguments in (("predict", {}), ("position", {"z": [0.1 * (k % 4)]})):
+            assert call(a, name, arguments) == call(b, name, arguments) == 0
+    np.testing.assert_allclose(a.x, b.x, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(a.P, b.P, rtol=1e-10, atol=1e-12)
