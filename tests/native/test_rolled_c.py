@@ -47,7 +47,7 @@ OPTIONS = [
     ("sqrt", "type: iekf, iterations: 3, variance_floor: {x: 0.1}, variance_ceiling: 0.5"),
 ]
 # without tanh, whose last bits are the platform's
-EXACT = [(form, options.replace("tanh(e/k)", "e/(k + abs(e))")) for form, options in OPTIONS]
+EXACT = [(form, options.replace("tanh(e/k)", "e/(k + abs(e))")) for form, options in OPTIONS if "ekf2" not in options]
 # five states, two of them measured together with others; exact components, correlated ones, a full Q, no Q at all
 MIXED = """
 kfgen: 1
@@ -79,7 +79,10 @@ measurements:
     R: [[0.01, 0.005], [0.005, 0.16]]
 filter: {type: ekf}
 """
-MODELS = {"mixed": MIXED, "run_time": RUN_TIME, "semidefinite": SEMIDEFINITE, "chain8": problems.chain(8)}
+MODELS = {"mixed": MIXED, "run_time": RUN_TIME, "semidefinite": SEMIDEFINITE}
+PAIRS = [(form, "mixed") for form in FORMS]
+PAIRS += [("ud-bierman", "run_time"), ("sqrt", "run_time")]
+PAIRS += [("ud-joseph", "semidefinite"), ("full-standard", "semidefinite")]
 
 
 def rolled(spec: Spec, unroll: str = "none") -> Spec:
@@ -99,7 +102,7 @@ def named(specs: Mapping[Any, Spec]) -> dict[Any, Generated]:
 def filters() -> tuple[dict[Any, Generated], dict[Any, NativeFilter]]:
     """All that is compared with the reference, by one call of the compiler."""
     specs = {(form, options): rolled(spec_with(TURN, options, form)) for form, options in OPTIONS}
-    specs |= {(form, name): rolled(in_form(text, form)) for form in FORMS for name, text in MODELS.items()}
+    specs |= {(form, name): rolled(in_form(MODELS[name], form)) for form, name in PAIRS}
     specs |= {(form, "chain12", u): rolled(in_form(problems.chain(12), form), u)
               for form, u in itertools.product(("ud-bierman", "full-standard"), ("none", "full"))}  # fmt: skip
     made = named(specs)
@@ -146,8 +149,7 @@ def test_options_are_those_of_the_reference(form, options):
     assert Status.OK in met or len(met) > 1
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(("form", "name"), PAIRS)
 def test_models_are_those_of_the_reference(form, name):
     """Sparse and full Q, noise inputs, exact, repeated and correlated components, an odd number of states."""
     made, natives = filters()
@@ -181,7 +183,8 @@ def test_functions_are_loops():
 @cache
 def in_float() -> list[tuple[Generated, NativeFilter]]:
     specs = {key: rolled(spec_with(MODEL, key[1], key[0], "float", "code: {gate_count: true}")) for key in EXACT}
-    specs |= {(form, "chain8"): rolled(in_form(problems.chain(8), form, "float")) for form in FORMS}
+    for form in ("ud-bierman", "full-standard"):
+        specs[form, "chain8"] = rolled(in_form(problems.chain(8), form, "float"))
     made = named(specs)
     natives = compiled(made, ("-O0", "-ffp-contract=off"))
     return [(made[key], natives[key]) for key in specs]
@@ -195,7 +198,7 @@ def test_c_is_the_program():
         if "bits" in kf.name:
             seen |= follow(twin)
             continue
-        for name, arguments in calls(problems.chain(8), 6):
+        for name, arguments in calls(problems.chain(8), 4):
             function = name if name == "predict" else f"update_{name}"
             assert twin.run(function, **arguments) == call(kf, name, arguments)
             assert not twin.differences(), f"{kf}: {function}"
@@ -240,8 +243,9 @@ def test_an_error_changes_nothing():
 def test_clean(compiler, tmp_path):
     if shutil.which(compiler) is None:
         absent(compiler)
+    floats, doubles = [made for made, _ in in_float()], list(filters()[0].values())
     files: dict[str, str] = {}
-    for made in [*(made for made, _ in in_float()), *filters()[0].values()]:
+    for made in {"gcc": [*floats, *doubles], "clang": doubles[:9], "g++": floats}[compiler]:
         files |= made.files
     language = ["-x", "c++"] if compiler.endswith("++") else []
     run([compiler, COMPILERS[compiler], *WARNINGS, "-fsyntax-only", *language, *write(files, tmp_path)], tmp_path)
