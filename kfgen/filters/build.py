@@ -96,7 +96,7 @@ def _rolled(model: Model, layout: Layout, scalar: Scalar, taken: frozenset[str])
     if isinstance(layout, Sqrt):
         return RolledSqrt(layout.n, names, kernels, weighted, steps, model.spec.name)
     if isinstance(layout, Full):
-        return RolledFull(layout, names, kernels)
+        return RolledFull(layout, names, kernels, steps)
     return layout
 
 

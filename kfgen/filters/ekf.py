@@ -6,19 +6,21 @@ update: see `sequence`. The filters that linearise otherwise are subclasses: iek
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import cast
 
 from kfgen.filters import guards, process
 from kfgen.filters.adapt import AdaptedQ, AdaptedR
 from kfgen.filters.base import Block, FilterCode
 from kfgen.filters.covariance import CovarianceCode, get_matrix
 from kfgen.filters.gate import gate, store_outcome
-from kfgen.filters.layout import Covariance, Layout
+from kfgen.filters.layout import Covariance, Layout, Rolled
 from kfgen.filters.linalg import Rows, Vector, plus
 from kfgen.filters.linalg import dot as inner_product
 from kfgen.filters.looped import Displacement, kept_in_array
+from kfgen.filters.looped import learnt as learn_in_loops
 from kfgen.filters.noise import Additive, Given
 from kfgen.filters.numbers import is_positive, require_nonnegative
 from kfgen.filters.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
@@ -68,6 +70,7 @@ class Learnt:
 
     residual: Vector = field(default_factory=list)
     Q: tuple[Symmetric, tuple[Rows, Vector] | None] | None = None
+    Q_in_loops: Callable[[], None] | None = None  # stores it
 
 
 class Ekf:
@@ -340,12 +343,19 @@ class Ekf:
             guards.finite(t, learnt.residual)
         if self.Q is not None:
             t.section("Q: what the state has moved")
-            learnt.Q = self.Q.next(t, final.steps)
-            guards.finite(t, [t.value(learnt.Q[0][i, i]) for i in range(len(x))])
+            if isinstance(final.moved, Displacement):
+                learnt.Q_in_loops = learn_in_loops(t, cast(Rolled, self.layout), self.Q, final.moved)
+            else:
+                learnt.Q = self.Q.next(t, final.steps)
+                guards.finite(t, [t.value(learnt.Q[0][i, i]) for i in range(len(x))])
         return learnt
 
     def store_update(self, u: Update, x: list[Value], P: Covariance, learnt: Learnt) -> None:
+        if learnt.Q_in_loops is not None and not self.layout.factored:  # while the gains are what they were
+            learnt.Q_in_loops()
         self.store(u.t, x, set(range(len(x))), P, after_predict=False)
+        if learnt.Q_in_loops is not None and self.layout.factored:  # when the arrays of P are free
+            learnt.Q_in_loops()
         if u.adapted is not None:
             u.adapted.store(u.t, learnt.residual, u.used)
         if self.Q is not None and learnt.Q is not None:

@@ -139,3 +139,14 @@ class Layout(Protocol):
     def put(self, t: Trace, P: Array, factors: Array) -> None:
         """Store a covariance given as the upper triangle of P and of its factors (D on the diagonal, U above)."""
         ...
+
+
+class Rolled(Layout, Protocol):
+    """A layout that is emitted as loops."""
+
+    def learn(self, moved: Any, field: str, rate: Fraction, sure: bool) -> None:
+        """Q <- (1 - rate) Q + rate times the sum of dx dx^T, in a field of the struct. sure: Q is known to be definite.
+
+        moved: the Displacement of which dx are the terms. Nothing can fail any more, and the arrays of P are free.
+        """
+        ...

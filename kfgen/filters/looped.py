@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from kfgen.filters import linalg
-from kfgen.filters.layout import GainChange
+from kfgen.filters import guards, linalg
+from kfgen.filters.adapt import AdaptedQ
+from kfgen.filters.layout import GainChange, Rolled
 from kfgen.filters.linalg import Vector
-from kfgen.filters.numbers import Number, is_zero, select
+from kfgen.filters.numbers import Number, is_positive, is_zero, select
 from kfgen.filters.runs import put
+from kfgen.filters.ud import column
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
@@ -121,6 +123,21 @@ def displaced(moved: Vector, gain: Vector, nu: Value) -> Vector:
     return Displacement(space, n, None, [(gain.array, step)])
 
 
+def learnt(t: Trace, layout: Rolled, Q: AdaptedQ, moved: Displacement) -> Callable[[], None]:
+    """Test that the next Q is finite; what stores it."""
+    field, n = f"kf.{Q.kept.field}", moved.n
+    total = t.variable(t.unique("trace"), 0)
+    with t.loop("i", 0, n) as i:
+        value = t.element(field, column(i) + i)
+        for gain, step in moved.terms:
+            dx = gain[i] * step
+            value = value + dx * dx
+        total.set(total.get() + value)
+    guards.finite(t, [total.get()])
+    sure = all(is_positive(d) for d in Q.kept.factors(t)[1]) if Q.kept.factored else False
+    return lambda: layout.learn(moved, field, Q.rate, sure)
+
+
 def at_rest(space: Space, n: int) -> Array:
     """The array of a Displacement, at zero."""
     array = space.array("moved", n)
@@ -197,6 +214,14 @@ def counter(t: Trace, name: str) -> Value:
 
 def integer(t: Trace, value: int) -> Value:
     return t.wrapped(t.pool.integer(value))
+
+
+def next_gain(space: Space, name: str, n: int, moved: Vector | None, steps: bool) -> Array:
+    """The array of a gain; steps: one of its own for every measurement, since all are asked for in the end."""
+    if not steps:
+        return space.anew(name, n, moved)
+    before = len(moved.terms) if isinstance(moved, Displacement) else 0
+    return space.array(f"{name}_{before}" if before else name, n)
 
 
 def select_counter(condition: Value, a: Value, b: Value | int) -> Value:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.kernels import absorb
@@ -74,6 +75,26 @@ class Absorber:
         """The two columns, of which `count` leading entries may differ from zero. sure: D is known to be positive."""
         U, D = self.arrays(space)
         space.t.call(absorb(self.kernels, self.n, sure), [(U.name, 0), (D.name, 0), ("w", 0), *weights, count])
+
+    def learn(self, space: Space, field: str, rate: Fraction, sure: bool, steps: list[tuple[Array, Value]]) -> None:
+        """See Rolled.learn; the field holds the factors as a Kept does."""
+        n, t = self.n, space.t
+        U, D = self.arrays(space)
+        w = self.columns(space)
+        with t.loop("j", 0, n) as j:
+            with t.loop("i", 0, j) as i:
+                U[triangle(j) + i] = t.element(field, column(j) + i)
+            D[j] = t.element(field, column(j) + j) * (1 - rate)
+        for c in range(0, len(steps), 2):
+            pair = steps[c : c + 2]
+            with t.loop("i", 0, n) as i:
+                for side, (gain, step) in enumerate(pair):
+                    w[i + side * n] = gain[i] * step
+            self.absorb(space, sure, [t.value(rate), t.value(rate if len(pair) > 1 else 0)], integer(t, n))
+        with t.loop("j", 0, n) as j:
+            with t.loop("i", 0, j) as i:
+                t.store(field, column(j) + i, U[triangle(j) + i])
+            t.store(field, column(j) + j, D[j])
 
     def _absorb_columns(self, space: Space, sure: bool, columns: list[tuple[Vector, Value]]) -> None:
         """One or two columns (vector, weight), of which the entries are known one by one."""

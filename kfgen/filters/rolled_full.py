@@ -10,7 +10,7 @@ from kfgen.filters.base import Block
 from kfgen.filters.full import Full, packed
 from kfgen.filters.kernels import add_terms, put_row, take_row
 from kfgen.filters.linalg import Measurement, Rows, Vector
-from kfgen.filters.looped import Column, Given, Kernels, Space, changed_gain, integer
+from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, changed_gain, integer, next_gain
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, is_constant, is_one, is_positive, is_zero, reciprocal, select, sqrt
 from kfgen.filters.runs import Put, put
@@ -66,10 +66,12 @@ class RolledFull(Full):
 
     rolled = True
 
-    def __init__(self, full: Full, names: list[str], kernels: Kernels) -> None:
+    def __init__(self, full: Full, names: list[str], kernels: Kernels, steps: bool) -> None:
+        """steps: as of RolledUD."""
         super().__init__(full.n, full.form, full.epsilon, full.sequence, full.change)
         self.names = names
         self.kernels = kernels
+        self.steps = steps
 
     def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
         return [replace(block, compact=True) for block in super().blocks(P0)]
@@ -161,7 +163,8 @@ class RolledFull(Full):
         if len(P.terms) == PENDING:
             P = self._written(P)
         space, h, r, g = P.space, measurement.h, measurement.r, measurement.g
-        c = space.anew(f"c{len(P.terms)}", self.n, measurement.moved)
+        number = len(P.terms)
+        c = next_gain(space, f"c{number}", self.n, measurement.moved, self.steps)
         seen = [i for i, x in enumerate(h) if not is_zero(x)]
         self._times(P, h, seen, c)
         s = t.value(linalg.plus(linalg.times(g, linalg.dot([h[i] for i in seen], [c[i] for i in seen])), r))
@@ -222,7 +225,8 @@ class RolledFull(Full):
         n, space = self.n, P.space
         h, r, g = measurement.h, measurement.r, measurement.g
         seen = [i for i, x in enumerate(h) if not is_zero(x)]
-        c, gain, rest = space.array("c0", n), space.anew("gain", n, measurement.moved), space.array("rest", n)
+        c, rest = space.array("c0", n), space.array("rest", n)
+        gain = next_gain(space, "gain", n, measurement.moved, self.steps)
         self._times(P, h, seen, c)
         s = t.value(linalg.plus(linalg.times(g, linalg.dot([h[i] for i in seen], [c[i] for i in seen])), r))
         t.name(s, "s")
@@ -269,6 +273,16 @@ class RolledFull(Full):
             t.flag(low, "REGULARIZED")
             array[place] = select(low, 0, variance)
         return P
+
+    def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
+        t, n = moved.space.t, self.n
+        with t.loop("j", 0, n) as j:
+            parts = [t.name(gain[j] * step * step * rate, "part") for gain, step in moved.terms]
+            with t.loop("i", 0, j + 1) as i:
+                total = t.element(field, column(j) + i) * (1 - rate)
+                for (gain, _), part in zip(moved.terms, parts, strict=True):
+                    total = total + gain[i] * part
+                t.store(field, column(j) + i, total)
 
     # the covariance ----------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from kfgen.filters.kernels import carlson
 from kfgen.filters.linalg import Measurement, Rows, Vector
-from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, integer
+from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, integer, next_gain
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, assume_nonnegative, constant_root, is_positive, select, sqrt
 from kfgen.filters.rolled_factors import Absorber
@@ -113,7 +113,7 @@ class RolledSqrt(Sqrt):
         U, D = self.absorber.arrays(space)
         moves = not self.steps
         if not moves:
-            space.anew("gain", n, measurement.moved)
+            applied = next_gain(space, "gain", n, measurement.moved, self.steps)
         elif not isinstance(measurement.moved, Displacement):
             at_rest(space, n)
         s = space.array("s", 2)
@@ -121,12 +121,15 @@ class RolledSqrt(Sqrt):
         function = carlson(self.kernels, n, is_positive(measurement.r), self.weighted, moves)
         row: list[Given] = [("h", 0), integer(t, first), integer(t, last), t.value(measurement.r)]
         weight = [t.value(measurement.g)] if self.weighted else []
-        gain: list[Given] = [t.value(measurement.nu), ("moved", 0)] if moves else [("gain", 0)]
+        gain: list[Given] = [t.value(measurement.nu), ("moved", 0)] if moves else [(applied.name, 0)]
         t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *gain, (s.name, 0)])
         variance = t.name(s[0], "variance")
         if moves:
             return P, [Displacement(space, n, Array(t, "moved"), [], s[1])], [variance]
-        return P, [Column(space, Array(t, "gain"), n)], [variance]
+        return P, [Column(space, applied, n)], [variance]
+
+    def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
+        self.absorber.learn(moved.space, field, rate, sure, moved.terms)
 
     # the covariance ----------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from kfgen.filters import linalg
 from kfgen.filters.kernels import bierman
 from kfgen.filters.layout import GainChange
 from kfgen.filters.linalg import Measurement, Rows, Vector
-from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, changed_gain, integer
+from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, changed_gain, integer, next_gain
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, assume_nonnegative, is_positive, is_zero
 from kfgen.filters.rolled_factors import Absorber
@@ -103,7 +103,7 @@ class RolledUD(UD):
         U, D = self.absorber.arrays(space)
         moves = self.change is None and not self.steps
         if not moves:
-            space.anew("gain", n, measurement.moved)
+            applied = next_gain(space, "gain", n, measurement.moved, self.steps)
         if moves and not isinstance(measurement.moved, Displacement):
             at_rest(space, n)
         s = space.array("s", 2)
@@ -117,7 +117,7 @@ class RolledUD(UD):
             row = [("h", 0), integer(t, first), integer(t, last)]
         row.append(t.value(measurement.r))
         weight = [t.value(measurement.g)] if self.weighted else []
-        gain: list[Given] = [t.value(measurement.nu), ("moved", 0)] if moves else [(space.array("gain", n).name, 0)]
+        gain: list[Given] = [t.value(measurement.nu), ("moved", 0)] if moves else [(applied.name, 0)]
         t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *gain, (s.name, 0)])
         variance = t.name(s[0], "variance")
         if moves:
@@ -125,10 +125,13 @@ class RolledUD(UD):
         if self.change is not None:
             t.section("the gain that is applied differs from K by w: + s w w^T")
             w = self.absorber.columns(space)
-            changed_gain(t, self.change, Array(t, "gain"), w, n)
+            changed_gain(t, self.change, applied, w, n)
             added = t.value(linalg.times(measurement.g, variance))
             self.absorber.absorb(space, False, [added, t.zero], integer(t, n))
-        return P, [Column(space, Array(t, "gain"), n)], [variance]
+        return P, [Column(space, applied, n)], [variance]
+
+    def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
+        self.absorber.learn(moved.space, field, rate, sure, moved.terms)
 
     # the covariance ----------------------------------------------------------------------------------
 
