@@ -89,10 +89,10 @@ def test_what_does_not_fit_is_told(unroll):
 
 def test_the_table_tells_the_forms(tmp_path):
     spec = chain(8, "auto", 4500, covariance="ud", update="bierman")
-    text = table([Built(spec, build(spec), tmp_path)])
+    text = table([Built(spec, build(spec), {}, tmp_path)])
     assert "predict: loops" in text
     assert "update_position: unrolled" in text
-    assert "loops" not in table([Built(chain(8), build(chain(8)), tmp_path)])
+    assert "loops" not in table([Built(chain(8), build(chain(8)), {}, tmp_path)])
 
 
 def test_a_single_state_has_nothing_to_loop_over():
