@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 from kfgen.filters import linalg
@@ -13,52 +13,13 @@ from kfgen.filters.linalg import Measurement, Rows, Vector
 from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, changed_gain, integer, next_gain
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, is_constant, is_one, is_positive, is_zero, reciprocal, select, sqrt
+from kfgen.filters.rolled_entries import Entries, Term
 from kfgen.filters.runs import Put, put
 from kfgen.filters.symmetric import Symmetric
 from kfgen.filters.ud import column
 from kfgen.ir.trace import Array, Trace, Value
 
 PENDING = 4  # measurements that are taken together, in one pass over P
-
-
-@dataclass(frozen=True)
-class Term:
-    """- weight c c^T of a measurement, c in a local array.
-
-    state: the one that it measures, if it is a single one: row and column of P are then share c, which is what is
-    left without the difference of nearly equal numbers.
-    """
-
-    c: Array
-    weight: Value
-    state: int | None = None
-    share: Value | None = None
-
-
-@dataclass(frozen=True)
-class Entries:
-    """P0 less the terms. P0 is that of the struct, or a local array: packed, or square."""
-
-    space: Space
-    array: str = ""  # empty: the struct's
-    square: bool = False
-    terms: tuple[Term, ...] = ()
-
-    def at(self, n: int, i: int | Value, j: int | Value) -> Value:
-        """Entry i <= j of P0."""
-        t = self.space.t
-        if self.square:
-            return Array(t, self.array)[j * n + i]
-        return self.at_place(column(j) + i if isinstance(j, Value) else packed(0, j) + i)
-
-    def at_place(self, place: int | Value) -> Value:
-        """An entry of a packed P0."""
-        t = self.space.t
-        return Array(t, self.array)[place] if self.array else t.element("kf.P", place)
-
-    def start(self, *states: int) -> int:
-        """The last term that tells the row of one of some states afresh; -1: none."""
-        return max((k for k, term in enumerate(self.terms) if term.state in states), default=-1)
 
 
 class RolledFull(Full):

@@ -243,7 +243,7 @@ CODE = Record(
         Key(
             "unroll",
             Choice(("auto", "full", "none")),
-            "`none`: loops over static arrays; `auto`: by size.",
+            "`none`: loops over static arrays; `auto`: loops where straight-line code would exceed `flash`.",
             "auto",
         ),
         Key("flash", Budget(), "Bytes of flash (k = 1024), predicted for a Cortex-M4F: more is a build error."),

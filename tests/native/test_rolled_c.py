@@ -79,6 +79,21 @@ measurements:
     R: [[0.01, 0.005], [0.005, 0.16]]
 filter: {type: ekf}
 """
+TIGHT = """
+kfgen: 1
+name: tight
+states: {a: {init: 0, std: 1000}, b: {init: 0, std: 1000}, c: {init: 0, std: 1}}
+dynamics: {form: discrete, f: {a: a + 0.1*b, b: b + 0.1*c}, Q: {a: 1e-6, b: 1e-6, c: 1e-6}}
+measurements:
+  s:
+    z:
+      x: {h: a, std: 0.1}
+      y: {h: b, std: 0.1}
+      again: {h: a, std: 0.1}
+      sum: {h: a + b, std: 0.1}
+      less: {h: b - c, std: 0.2}
+filter: {type: kf}
+"""
 MODELS = {"mixed": MIXED, "run_time": RUN_TIME, "semidefinite": SEMIDEFINITE}
 PAIRS = [(form, "mixed") for form in FORMS]
 PAIRS += [("ud-bierman", "run_time"), ("sqrt", "run_time")]
@@ -178,6 +193,22 @@ def test_functions_are_loops():
                 assert any(isinstance(s, For) for s in walk(functions[name].body)), (form, name)
             lengths.append(made.files[f"chain{n}.c"].count(";"))
         assert lengths[1] < 1.5 * lengths[0], form
+
+
+def test_precise_measurements_of_what_is_hardly_known():
+    """A variance of 1e6 measured with 0.01, in float: no digits are lost to differences of nearly equal numbers."""
+    specs = {form: rolled(in_form(TIGHT, form, "float")) for form in FORMS}
+    random = np.random.default_rng(1)
+    ref = reference(in_form(TIGHT, "full-joseph"))
+    natives = compiled(named(specs))
+    for _ in range(12):
+        z = random.normal(0, 1, 5)
+        assert ref.predict() == ref.update("s", z) == 0
+        deviations = np.sqrt(np.diag(ref.P))
+        for form, kf in natives.items():
+            assert kf.predict() == kf.update("s", z) == 0
+            assert np.max(np.abs(kf.P - ref.P) / np.outer(deviations, deviations)) < 1e-4, form
+            assert np.max(np.abs(kf.x - ref.x) / deviations) < 1e-4, form
 
 
 @cache
