@@ -8,13 +8,13 @@ from functools import cache
 
 import pytest
 
+from kfgen.cost import Cost, measure, recommended_flags
 from kfgen.errors import SpecError
 from kfgen.generate import build
 from kfgen.override import override
 from kfgen.simulate import simulate
 from kfgen.spec import loads
 from kfgen.spec.types import Spec
-from tests.benchmarks.measure import Cost, measure, recommended_flags
 from tests.oracle import problems
 
 # of chain16: instructions of one predict and one update, bytes of flash; bytes of stack with 16 states
