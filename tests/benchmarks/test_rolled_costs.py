@@ -37,7 +37,7 @@ def spec_of(n: int, covariance: str, update: str | None, unroll: str, options: s
 def cost(n: int, covariance: str, update: str | None, unroll: str = "none", options: str = "") -> Cost:
     spec = spec_of(n, covariance, update, unroll, options)
     files = build(spec).files
-    return measure(spec, files, simulate(spec, 8), recommended_flags(files[f"{spec.name}.h"]))
+    return measure(spec, files, simulate(spec, 8), flags=recommended_flags(files[f"{spec.name}.h"]))
 
 
 @pytest.mark.usefixtures("_tools")
