@@ -71,5 +71,5 @@ def test_a_budget_that_loops_keep_is_kept(form):
         except SpecError:
             assert budget < 2 * least  # functions that are not measured here count too
             continue
-        found = measure(spec, files, simulate(spec, 3), recommended_flags(files[f"{spec.name}.h"]))
+        found = measure(spec, files, simulate(spec, 3), flags=recommended_flags(files[f"{spec.name}.h"]))
         assert found.flash <= budget
