@@ -112,7 +112,7 @@ def test_float_stays_beside_the_reference():
 
 
 # P0 and Q far apart: what the rank-one time update is most sensitive to
-SCALINGS = [(1e-4, 1e-12), (1e2, 1e-12), (1e2, 1e-6)]
+SCALINGS = [(1e-4, 1e-12), (1e2, 1e-12)]
 
 
 def scaled(name: str, P0: float, Q: float) -> str:

@@ -17,7 +17,7 @@ from kfgen.reference import reference
 from kfgen.spec import loads
 from kfgen.status import ERROR, Status
 
-BATCHES, SIZE, STEPS = 6, 10, 8
+BATCHES, SIZE, STEPS = 4, 10, 8
 
 
 def matrix(rows: np.ndarray) -> str:

@@ -26,11 +26,9 @@ KAPPA0 = "sigma_points: {kind: julier, kappa: 0, redraw: false}"
     ("cv", "ca", "peer"),
     [
         (BIERMAN, BIERMAN, "filterpy_imm3_imm"),
-        (BIERMAN, BIERMAN, "yafl_imm3_imm_bierman"),
         ("type: kf, update: joseph", "type: ekf, covariance: full", "yafl_imm3_imm_bierman"),
         ("type: ekf, covariance: sqrt", "type: iekf, iterations: 2", "filterpy_imm3_imm"),
-        ("type: ekf, covariance: full, update: standard", "type: ekf2", "filterpy_imm3_imm"),
-        ("type: ukf, covariance: full", "type: ukf, covariance: sqrt", "filterpy_imm3_imm"),
+        ("type: ekf2, covariance: full, update: standard", "type: ukf, covariance: sqrt", "filterpy_imm3_imm"),
         (BIERMAN, f"{UKF}, {KAPPA0}", "yafl_imm3_imm_ekf_ukf_kappa0"),
     ],
 )
