@@ -9,9 +9,9 @@
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
 #define BATTERY_flash PROGMEM
-static battery_real_t battery_read(const battery_real_t *from)
+static float battery_read(const float *from)
 {
-    battery_real_t value;
+    float value;
     memcpy_P(&value, from, sizeof value);
     return value;
 }
@@ -21,18 +21,18 @@ static battery_real_t battery_read(const battery_real_t *from)
 #define BATTERY_at(array, i) (array)[i]
 #endif
 
-static const battery_real_t battery_table0_x[25] BATTERY_flash = {
+static const float battery_table0_x[25] BATTERY_flash = {
     -0.05f, -0.05f, 0.02f, 0.04f, 0.06f, 0.08f, 0.1f, 0.13f, 0.16f, 0.2f, 0.25f, 0.3f, 0.35f,
     0.4f, 0.5f, 0.6f, 0.7f, 0.8f, 0.88f, 0.92f, 0.95f, 0.97f, 0.98f, 0.99f, 1.05f
 };
 
-static const battery_real_t battery_table0_y[25] BATTERY_flash = {
+static const float battery_table0_y[25] BATTERY_flash = {
     1.415f, 1.415f, 2.535f, 2.855f, 2.984f, 3.066f, 3.133f, 3.1955f, 3.2019f, 3.223f, 3.2411f,
     3.2546f, 3.2656f, 3.2867f, 3.2965f, 3.3013f, 3.313f, 3.3335f, 3.3407f, 3.3555f, 3.3592f,
     3.3767f, 3.4026f, 3.4328f, 4.279f
 };
 
-static const battery_real_t battery_table0_slope[25] BATTERY_flash = {
+static const float battery_table0_slope[25] BATTERY_flash = {
     0.0f, 16.0f, 16.0f, 6.45f, 4.1f, 3.35f, 2.0833333f, 0.21333334f, 0.5275f, 0.362f, 0.27f,
     0.22f, 0.422f, 0.098f, 0.048f, 0.117f, 0.205f, 0.09f, 0.37f, 0.123333335f, 0.875f, 2.59f,
     3.02f, 14.103333f, 0.0f
