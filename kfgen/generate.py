@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from kfgen.budgets import Prediction, exceeded, predict
 from kfgen.emit.render import render
 from kfgen.emit.view import View, make_view
 from kfgen.errors import SpecError
@@ -21,11 +22,13 @@ from kfgen.spec.types import Spec
 
 @dataclass(frozen=True)
 class Summary:
-    """What the build table shows: operations per function, RAM in bytes, remarks; loops or unrolled, where chosen."""
+    """What the build table shows: operations per function, RAM in bytes, remarks, flash and stack as predicted (not of
+    fixed point), loops or unrolled, where chosen."""
 
     rows: list[tuple[str, dict[str, int]]]
     ram: int
     notes: list[str]
+    prediction: Prediction | None = None
     forms: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -59,7 +62,11 @@ def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judg
         raise SpecError.at(
             place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
         ) from None
-    return Generated(render(view), summary(code, view), code, view)
+    prediction = predict(spec, code, SCALARS[spec.scalar], view.ram)
+    mistakes = exceeded(spec, prediction)
+    if judge and mistakes:
+        raise SpecError(mistakes)
+    return Generated(render(view), replace(summary(code, view), prediction=prediction), code, view)
 
 
 def _fixed(spec: Spec, overridden: bool, log: Log | None) -> Generated:
@@ -87,7 +94,7 @@ def summary(code: FilterCode, view: View) -> Summary:
         order = "" if mode.order == code.order else f"; inner order: {inner}"
         notes.append(f"{mode.name}: {mode.description}{order}")
     notes += code.remarks
-    return Summary(rows, view.ram, notes, code.forms)
+    return Summary(rows, view.ram, notes, None, code.forms)
 
 
 def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:

@@ -18,6 +18,8 @@
  *   predict       504 mul, 322 add, 48 div, 23 compare, 44 select
  *   update_accel  339 mul, 243 add, 21 div, 5 compare
  *   update_mag    354 mul, 255 add, 21 div, 5 compare
+ * Recommended with gcc, for these long functions without branches:
+ *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * 219a179cd2c35a94a5ef8f0d3c46f5dd92dfcd65d45d99ef51e29983c78dfdb5

@@ -198,31 +198,53 @@ def _lines(text: str) -> list[str]:
 
 
 def table(built: Sequence[Built]) -> str:
-    """Per filter its sizes, RAM and files, and the arithmetic of each function, in aligned columns."""
-    rows = [("filter", "size", "RAM", "function", "operations", "files")]
+    """Per filter its sizes, RAM and files, and each function's flash, stack and arithmetic, in aligned columns."""
+    rows = [("filter", "size", "RAM", "function", "flash", "stack", "operations", "files")]
     notes: list[str] = []
     for each in built:
         sizes, summary = _sizes(each.spec), each.generated.summary
-        forms = summary.forms
+        forms, found = summary.forms, summary.prediction
+        flash, stack = (found.flash, found.stack) if found is not None else ({}, {})
         functions = [
-            (_with_form(name, forms), _operations(counts) if counts or name not in forms else "")
+            (
+                _with_form(name, forms), _about(flash.get(name)), _about(stack.get(name)),
+                _operations(counts) if counts or name not in forms else "",
+            )
             for name, counts in summary.rows
         ]
         files = [str(path) for path in each.files]
         for i in range(max(len(sizes), len(functions), len(files))):
-            function, operations = functions[i] if i < len(functions) else ("", "")
             rows.append(
                 (
                     each.spec.name if i == 0 else each.spec.scalar if i == 1 else "",
                     sizes[i] if i < len(sizes) else "",
                     f"{summary.ram} B" if i == 0 else "",
-                    function,
-                    operations,
+                    *(functions[i] if i < len(functions) else ("", "", "", "")),
                     files[i] if i < len(files) else "",
                 )
             )
         notes += [f"{each.spec.name}: {note}" for note in summary.notes]
-    return "\n".join([*aligned(rows, right=(2,)), *notes])
+        if found is not None:
+            notes.append(f"{each.spec.name}: {_predicted(each.spec, found.totals)}")
+    return "\n".join([*aligned(rows, right=(2, 4, 5)), *notes])
+
+
+_TITLES = {"flash": "flash", "ram": "RAM", "stack": "stack"}
+
+
+def _about(size: int | None) -> str:
+    return "" if size is None else f"~{size}"
+
+
+def _predicted(spec: Spec, totals: Mapping[str, int]) -> str:
+    """Flash and stack, and the budgets there are."""
+    parts = []
+    for key, size in totals.items():
+        budget = getattr(spec.code, key)
+        if key != "ram" or budget is not None:
+            of = "" if budget is None else f" of {budget}"
+            parts.append(f"{'' if key == 'ram' else 'about '}{size}{of} bytes of {_TITLES[key]}")
+    return f"{', '.join(parts)} on a Cortex-M4F, as predicted; `kfgen cost` measures"
 
 
 def _sizes(spec: Spec) -> list[str]:

@@ -99,7 +99,8 @@ def exceeded(spec: Spec, found: Cost) -> list[str]:
     for key, size in pairs.items():
         budget = getattr(spec.code, key)
         if budget is not None and size > budget:
-            messages.append(f"{spec.name}: {size} bytes of {key}, {size - budget} above the budget of {budget}")
+            title = "RAM" if key == "ram" else key
+            messages.append(f"{spec.name}: {size} bytes of {title}, {size - budget} above the budget of {budget}")
     return messages
 
 

@@ -80,7 +80,7 @@ def _unrolled_or_not(model: Model, scalar: Scalar, taken: frozenset[str]) -> Fil
         return told(code, {f.name for f in code.functions}) if chosen.unroll == "none" else code
     straight = emitted(chosen.unroll)
     looped = emitted("none") if chosen.unroll == "auto" else straight
-    return choose(straight, looped, chosen.flash, chosen.unroll == "none")
+    return choose(straight, looped, chosen.flash, chosen.unroll == "none", scalar.name)
 
 
 def _rolled(model: Model, layout: Layout, scalar: Scalar, taken: frozenset[str]) -> Layout:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 
-from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
+from kfgen.ir.footprint import predicted
 from kfgen.ir.program import Call, For, Function, walk
-from kfgen.ir.size import predicted_flash
 
 MARGIN = 1.25  # what a prediction may be wrong by: within it a choice still fits
 LOOPS, STRAIGHT = "loops", "unrolled"
@@ -20,35 +19,30 @@ LOOPING = (
 )
 
 
-def choose(straight: FilterCode, looped: FilterCode, budget: int, loops: bool = False) -> FilterCode:
+def choose(straight: FilterCode, looped: FilterCode, budget: int, loops: bool, scalar: str) -> FilterCode:
     """The functions of two forms of a filter, loops where straight-line code would exceed the budget in bytes.
 
-    Those that save most become loops first; none does that saves nothing. loops: all of them are. Raises SpecError
-    where even the smallest choice is predicted to exceed the budget.
+    Those that save most become loops first; none does that saves nothing. loops: all of them are. Where even the
+    smallest choice is predicted to exceed the budget, it is that one: whoever judges budgets tells.
     """
     names = [f.name for f in straight.functions if _counted(f)]
     rolled: set[str] = set(names) if loops else set()
-    while _flash(_mixed(straight, looped, rolled)) * MARGIN > budget:
-        found = _flash(_mixed(straight, looped, rolled))
-        sizes = {name: _flash(_mixed(straight, looped, rolled | {name})) for name in names if name not in rolled}
+
+    def flash(chosen: set[str]) -> int:
+        functions = with_privates(_mixed(straight, looped, chosen)).functions
+        return predicted([f for f in functions if f.private or f.name == "init" or _counted(f)], scalar)
+
+    while flash(rolled) * MARGIN > budget:
+        found = flash(rolled)
+        sizes = {name: flash(rolled | {name}) for name in names if name not in rolled}
         smaller = {name: size for name, size in sizes.items() if size < found}
         if not smaller:  # perhaps all together, which share private functions
             everything = set(names)
-            if rolled != everything and _flash(_mixed(straight, looped, everything)) < found:
+            if rolled != everything and flash(everything) < found:
                 rolled = everything
             break
         rolled.add(min(smaller, key=lambda name: smaller[name]))
-    code = _mixed(straight, looped, rolled)
-    total = _flash(code)
-    if total > budget:
-        spec = straight.model.spec
-        parts = ", ".join(f"{f.name} {predicted_flash(f)}" for f in with_privates(code).functions)
-        raise SpecError.at(
-            spec.code.places.get("flash", spec.place),
-            f"{total} bytes of flash are predicted, {total - budget} more than the budget ({parts})",
-            "raise the budget, or choose a smaller filter",
-        )
-    return code
+    return _mixed(straight, looped, rolled)
 
 
 def told(code: FilterCode, rolled: Collection[str]) -> FilterCode:
@@ -82,10 +76,6 @@ def _mixed(straight: FilterCode, looped: FilterCode, rolled: set[str]) -> Filter
     functions = tuple(other[f.name] if f.name in rolled else f for f in straight.functions if not f.private)
     constants = {**straight.constants, **looped.constants} if rolled else straight.constants
     return told(replace(straight, functions=functions, constants=constants), rolled)
-
-
-def _flash(code: FilterCode) -> int:
-    return sum(predicted_flash(f) for f in with_privates(code).functions)
 
 
 def _callees(function: Function) -> Iterator[Function]:

@@ -30,6 +30,7 @@ from kfgen.filters.sensor import Innovation, Linearised, SensorCode, decorrelate
 from kfgen.filters.sequence import Sequence, Updated, departs
 from kfgen.filters.state import StateCode
 from kfgen.filters.symmetric import Symmetric
+from kfgen.ir.footprint import crowded
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace, Value
@@ -38,7 +39,7 @@ from kfgen.model.model import SensorModel
 from kfgen.scalars import Scalar
 
 # Measured with gcc 12 on a Cortex-M4F: its schedulers lengthen live ranges, and what no longer fits the registers
-# costs two instructions each time.
+# costs two instructions each time. `kfgen cost` shows the figures with these flags and without.
 LONG_FUNCTIONS = (
     "Recommended with gcc, for these long functions without branches:",
     "  -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers",
@@ -117,13 +118,16 @@ class Ekf:
         if self.Q is not None:
             functions.append(self.covariance.get_noise(self.Q.kept, taken))
         functions += self.further_functions(taken)
+        names = {"predict", *(f"update_{sensor.name}" for sensor in model.sensors)}
+        steps = [function for function in functions if function.name in names]
+        long = len(self.order) >= 8 or (self.scalar.name == "float" and crowded(steps))
         return FilterCode(
             model=model,
             blocks=tuple(self.state.blocks()),
             functions=tuple(functions),
             order=tuple(self.order) if self.layout.reorders else tuple(range(len(self.order))),
             description=self.description(),
-            notes=LONG_FUNCTIONS if len(self.order) >= 8 else (),
+            notes=LONG_FUNCTIONS if long else (),
             constants=self.covariance.constants(),
             remarks=self.remarks(),
         )

@@ -20,13 +20,10 @@ def unbuilt(spec: Spec) -> list[Mistake]:
     if spec.imm is not None and spec.scalar not in ("float", "double"):
         refuse(spec.places.get("scalar", spec.place), f"imm with scalar: {spec.scalar}", "use float or double")
     code = spec.code
-    if spec.imm is not None and (code.unroll == "none" or code.flash):
-        for key in ("unroll", "flash"):
-            if key in code.places:
-                refuse(code.places[key], f"code.{key} with imm", "leave it out")
-    for key, wanted in {
-        "ram": code.ram, "stack": code.stack,
-    }.items():  # fmt: skip
-        if wanted:
-            refuse(code.places.get(key, spec.place), f"code.{key}", "leave it out")
+    if spec.imm is not None and code.unroll == "none":
+        refuse(code.places.get("unroll", spec.place), "code.unroll: none with imm", "leave it out")
+    if spec.scalar not in ("float", "double"):
+        for key in ("flash", "ram", "stack"):
+            if getattr(code, key) is not None:
+                refuse(code.places.get(key, spec.place), f"code.{key} with scalar: {spec.scalar}", "leave it out")
     return out

@@ -246,8 +246,13 @@ CODE = Record(
             "`none`: loops over static arrays; `auto`: loops where straight-line code would exceed `flash`.",
             "auto",
         ),
-        Key("flash", Budget(), "Bytes of flash (k = 1024), predicted for a Cortex-M4F: more is a build error."),
-        Key("ram", Budget(), "Bytes of RAM, likewise."),
+        Key(
+            "flash",
+            Budget(),
+            "Bytes of flash (k = 1024) of init, predict and the updates without library functions, predicted for a "
+            "Cortex-M4F: more is a build error.",
+        ),
+        Key("ram", Budget(), "Bytes of RAM of one filter, likewise."),
         Key("stack", Budget(), "Bytes of stack, likewise."),
         Key("log_likelihood", Flag(), "Keep the log-likelihood of the last update.", "false"),
         Key("gate_count", Flag(), "Keep the number of rejections in a row, per sensor.", "false"),

@@ -18,6 +18,13 @@ NATIVE = Path(__file__).parent.parent / "native"
 
 
 @dataclass
+class Prediction:
+    flash: dict[str, int] = field(default_factory=lambda: {"init": 60, "predict": 400, "update_gnss": 700})
+    stack: dict[str, int] = field(default_factory=lambda: {"init": 0, "predict": 40, "update_gnss": 64})
+    totals: dict[str, int] = field(default_factory=lambda: {"flash": 1160, "ram": 48, "stack": 64})
+
+
+@dataclass
 class Summary:
     rows: list[tuple[str, dict[str, int]]] = field(
         default_factory=lambda: [
@@ -28,6 +35,7 @@ class Summary:
     ram: int = 48
     notes: list[str] = field(default_factory=lambda: ["states are kept in the order px, py, th"])
     forms: dict[str, str] = field(default_factory=dict)
+    prediction: Prediction = field(default_factory=Prediction)
 
 
 @dataclass

@@ -9,14 +9,15 @@ from kfgen.commands.options import aligned
 SPEC = "vehicle_small.yaml"
 
 TABLE = """\
-filter         size         RAM  function     operations             files
--------------  ----------  ----  -----------  ---------------------  ---------------------------------------
-vehicle_small  3 states    48 B  predict      31 mul, 27 add, 1 sin  generated/vehicle_small/vehicle_small.h
-float          1 input           update_gnss  2 div                  generated/vehicle_small/vehicle_small.c
+filter         size         RAM  function     flash  stack  operations             files
+-------------  ----------  ----  -----------  -----  -----  ---------------------  ---------------------------------------
+vehicle_small  3 states    48 B  predict       ~400    ~40  31 mul, 27 add, 1 sin  generated/vehicle_small/vehicle_small.h
+float          1 input           update_gnss   ~700    ~64  2 div                  generated/vehicle_small/vehicle_small.c
                gnss: 2
                compass: 1
 vehicle_small: states are kept in the order px, py, th
-"""
+vehicle_small: about 1160 bytes of flash, about 64 bytes of stack on a Cortex-M4F, as predicted; `kfgen cost` measures
+"""  # noqa: E501
 
 
 def test_writes_the_files_and_prints_a_table(kfgen, folder):

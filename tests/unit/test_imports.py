@@ -34,7 +34,8 @@ ALLOWED = {
     "filters": SPEC | {"ir", "model", "quantiles", "scalars"},
     "fixed": SPEC | {"emit", "filters", "ir", "logs", "model", "scalars"},
     "emit": {"errors", "filters", "ir", "scalars"},
-    "generate": SPEC | {"emit", "filters", "fixed", "ir", "logs", "scalars"},
+    "budgets": SPEC | {"filters", "ir", "scalars"},
+    "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars"},
     # the compiled filter, and what uses it
     "native": SPEC | {"files", "generate", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},

@@ -1,0 +1,178 @@
+"""`python -m tests.benchmarks.calibrate`: fit the bytes of kfgen/ir/sizes.py to what arm-none-eabi-gcc makes.
+
+Every spec of the repository and the problems of the tests are generated in all forms of the covariance, as float and
+double, and compiled for a Cortex-M4F; each emitted function is one equation for the flash, and one for the stack.
+The coefficients are the non-negative ones of least relative error. Prints the errors; writes the table.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from scipy.optimize import nnls
+
+from kfgen.cost import recommended_flags, target_of
+from kfgen.cost.toolchain import Gcc
+from kfgen.errors import SpecError
+from kfgen.generate import build
+from kfgen.ir.footprint import Traits, stack_traits, traits
+from kfgen.ir.program import Call, Function, walk
+from kfgen.override import override
+from kfgen.spec import loads
+from tests.oracle import problems
+
+ROOT = Path(__file__).parents[2]
+FORMS = [
+    {"covariance": "ud", "update": "bierman"}, {"covariance": "ud", "update": "joseph"},
+    {"covariance": "full", "update": "joseph"}, {"covariance": "full", "update": "standard"}, {"covariance": "sqrt"},
+]  # fmt: skip
+UNSCENTED = ("covariance: ud", "covariance: full", "covariance: sqrt", "covariance: ud, sequential: true")
+SCALARS = ("float", "double")
+STACK_COLUMNS = ("base", "live", "beyond", "kept", "calls", "loop")
+WIDTH = {"float": 4, "double": 8}
+Row = tuple[str, str, Traits, int, int]  # scalar, label, what it is made of, bytes of flash, bytes of stack
+
+
+def filters() -> Iterator[tuple[str, str, str, dict[str, str]]]:
+    """Label, a spec's text, scalar, changes of the filter."""
+    texts = {path.stem: path.read_text() for path in sorted((ROOT / "specs").glob("*.yaml"))}
+    texts |= {name: problems.ALL[name] for name in ("cv4", "vehicle4", "chain4", "chain8", "radar", "ball", "att")}
+    texts["chain12"], texts["chain16"] = problems.chain(12), problems.chain(16)
+    for name, text in texts.items():
+        for scalar in SCALARS:
+            if scalar == "double" and name in ("chain12", "chain16", "att"):
+                continue
+            yield name, text, scalar, {}
+            if "type: ukf" in text:
+                continue
+            for form in FORMS:
+                yield f"{name} {form}", text, scalar, form
+            if name in ("vehicle4", "chain4", "chain8", "chain12", "radar"):
+                for form in UNSCENTED:
+                    yield f"{name} ukf {form}", text.replace("type: ekf", f"type: ukf, {form}"), scalar, {}
+
+
+def rows(job: tuple[str, str, str, dict[str, str]]) -> list[Row]:
+    """The functions of a filter, compiled. A function that calls private ones is taken together with them."""
+    label, text, scalar, form = job
+    try:
+        spec = override(loads(text), scalar, **({"filter": form} if form else {}))
+        generated = build(spec, judge=False)
+    except SpecError:
+        return []  # a form that this filter cannot have
+    flags = recommended_flags(generated.files[f"{spec.name}.h"])
+    flash, stack = compiled(spec.name, generated.files, flags)
+    out: list[Row] = []
+    for function in generated.code.functions:
+        name = f"{spec.name}_{function.name}"
+        if function.private or name not in flash:
+            continue
+        if len(spec.states) < 4 and function.name.startswith(("get_", "set_")):
+            continue  # loops so short that the compiler unrolls them
+        whole, size, depth = traits(function), flash[name], stack[name]
+        for callee in callees(function):
+            inlined = f"{spec.name}_{callee.name}" not in flash
+            part = traits(callee)
+            if inlined:
+                whole.counts += part.counts
+                whole.counts["call"] -= 1
+                whole.arrays += part.arrays
+                whole.live = max(whole.live, part.live)
+        out.append((scalar, f"{label} {function.name}", whole, size, depth))
+    return out
+
+
+def callees(function: Function) -> list[Function]:
+    """The private functions that a function calls, each once."""
+    return list({id(s.callee): s.callee for s in walk(function.body) if isinstance(s, Call)}.values())
+
+
+def compiled(name: str, files: dict[str, str], flags: list[str]) -> tuple[Counter[str], dict[str, int]]:
+    """Bytes of flash and of stack of each function of an object file."""
+    gcc = target_of("cortex-m4f").compiler("gcc")  # type: ignore[attr-defined]
+    assert isinstance(gcc, Gcc)
+    with TemporaryDirectory() as path:
+        folder = Path(path)
+        for file, text in files.items():
+            (folder / file).write_text(text)
+        made = gcc.compile(folder, f"{name}.c", [*flags, "-fstack-usage"])
+        listed = subprocess.run(
+            ["arm-none-eabi-size", "-A", made], cwd=folder, capture_output=True, text=True, check=True
+        )
+        usage = Path(folder, f"{name}.su").read_text()
+    flash: Counter[str] = Counter()
+    for section, size in re.findall(r"^\.text\.(\S+)\s+(\d+)", listed.stdout, re.MULTILINE):
+        flash[section.removeprefix("unlikely.").partition(".")[0]] += int(size)
+    stack = {function: int(size) for function, size in re.findall(r":(\w+)\t(\d+)\t", usage)}
+    return flash, stack
+
+
+def fitted(A: np.ndarray, y: np.ndarray, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients, and the relative errors (of at least `floor` bytes)."""
+    weight = 1 / np.maximum(y, floor)
+    x, _ = nnls(A * weight[:, None], y * weight)
+    return x, (A @ x - y) * weight
+
+
+def main() -> int:
+    """Measure, fit, print, write."""
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        write(*fit([row for part in pool.map(rows, filters(), chunksize=4) for row in part]))
+    return 0
+
+
+def fit(found: list[Row]) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
+    """The tables of flash and of stack."""
+    flash: dict[str, dict[str, float]] = {}
+    stack: dict[str, dict[str, float]] = {}
+    for scalar in SCALARS:
+        mine = [row for row in found if row[0] == scalar]
+        kinds = sorted({kind for row in mine for kind in row[2].counts})
+        A = np.array([[row[2].counts[kind] for kind in kinds] for row in mine], float)
+        x, errors = fitted(A, np.array([row[3] for row in mine], float), 256)
+        flash[scalar] = {kind: round(float(each), 2) for kind, each in zip(kinds, x, strict=True)} | {"other": 8.0}
+        tell(f"{scalar} flash", mine, errors)
+        steps = [row for row in mine if row[1].rpartition(" ")[2].startswith(("predict", "update"))]
+        S = np.array([stack_traits(row[2]) for row in steps], float)
+        y = np.array([row[4] - WIDTH[scalar] * row[2].arrays for row in steps], float)
+        x, errors = fitted(S, y, 64)
+        stack[scalar] = {kind: round(float(each), 2) for kind, each in zip(STACK_COLUMNS, x, strict=True)}
+        tell(f"{scalar} stack", steps, errors)
+    return flash, stack
+
+
+def tell(title: str, mine: list[Row], errors: np.ndarray) -> None:
+    worst = np.argsort(-np.abs(errors))[:8]
+    print(f"{title}: {len(mine)} functions, rms {np.sqrt(np.mean(errors**2)):.1%}")
+    for i in worst:
+        print(f"  {errors[i]:+.0%}  {mine[i][1]}: flash {mine[i][3]}, stack {mine[i][4]}")
+
+
+def write(flash: dict[str, dict[str, float]], stack: dict[str, dict[str, float]]) -> None:
+    """kfgen/ir/sizes.py."""
+    lines = [
+        '"""Bytes on a Cortex-M4F, by scalar and kind; written by `python -m tests.benchmarks.calibrate`."""',
+        "",
+        "from __future__ import annotations",
+        "",
+        "from collections.abc import Mapping",
+    ]
+    for name, table in (("FLASH", flash), ("STACK", stack)):
+        lines += ["", f"{name}: Mapping[str, Mapping[str, float]] = {{"]
+        for scalar, row in table.items():
+            lines += [f'    "{scalar}": {{', *(f'        "{kind}": {size},' for kind, size in row.items()), "    },"]
+        lines.append("}")
+    lines += ["", f"WIDTH: Mapping[str, int] = {WIDTH}".replace("'", '"'), ""]
+    (ROOT / "kfgen/ir/sizes.py").write_text("\n".join(lines))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
