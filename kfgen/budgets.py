@@ -46,7 +46,8 @@ def predict(spec: Spec, code: FilterCode, scalar: Scalar, size: int) -> Predicti
     tables = sum(3 * (len(table.x) + 1) for table in code.tables) + sum(len(each.numbers) for each in code.lookups)
     if tables:
         flash["constants"] = tables * scalar.size
-    stack = {function.name: footprint.predicted_stack(function, scalar.name) for function in counted if not function.private}
+    public = [function for function in counted if not function.private]
+    stack = {function.name: footprint.predicted_stack(function, scalar.name) for function in public}
     widths = {"real": scalar.size, "uint32": 4, "bool": 1}
     ram = {block.name: widths.get(block.kind, scalar.size) * (block.size or 1) for block in code.blocks}
     if spec.parameters:
