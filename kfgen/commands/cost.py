@@ -119,6 +119,7 @@ def text(target: Target, found: Mapping[str, Cost], mhz: float | None, source: s
     """The tables, one for each set of flags."""
     first = found["measured"]
     lines = [f"{first.name} ({first.scalar}) on {target.title}, over {source}", f"compiled by {first.compiler}"]
+    lines += [f"note: {first.remark}"] if first.remark else []
     for cost in found.values():
         why = "recommended in the header" if len(found) > 1 and cost is not first else ""
         flags = " ".join(cost.flags)

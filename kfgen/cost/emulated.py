@@ -85,7 +85,8 @@ class Emulated:
         }  # fmt: skip
         return Cost(
             job.name, job.scalar, self.name, chosen.title, tuple(flags), self.unit, functions, flash, linked_flash,
-            machine.word(f"{job.prefix}size"), errors, shared(job, functions, flash), init.stack,
+            machine.word(f"{job.prefix}size"), errors, chosen.remark(job.files[f"{job.name}.c"]),
+            shared(job, functions, flash), init.stack,
         )  # fmt: skip
 
     def load(self, job: Job, flags: Sequence[str] = (), compiler: str | None = None) -> Machine:

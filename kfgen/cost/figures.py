@@ -50,6 +50,7 @@ class Cost:
     flash_linked: int
     ram: int
     errors: int
+    remark: str = ""  # what the reader of the figures should know
     shared: int = 0  # bytes of `flash` that are init's, or not of one function
     init_stack: int = 0
 

@@ -26,6 +26,8 @@ from kfgen.native.compiler import cache_directory
 
 FLAGS = ("-O2", "-std=gnu99", "-fno-math-errno", "-ffunction-sections", "-fdata-sections")
 
+_IN_DOUBLE = re.compile(r"\b(?:sin|cos|tan|exp|log|pow)f\(")
+
 
 @dataclass(frozen=True)
 class Placed:
@@ -57,6 +59,10 @@ class Compiler(Protocol):
         """Whether it takes the options of gcc that a header may recommend."""
         ...
 
+    def remark(self, text: str) -> str:
+        """What the reader of the figures of a C file should know."""
+        ...
+
     def compile(self, folder: Path, source: str, flags: Sequence[str] = ()) -> str:
         """Compile a file of the folder; the object's name."""
         ...
@@ -79,6 +85,9 @@ class Gcc:
     @property
     def title(self) -> str:
         return _version(self.command)
+
+    def remark(self, text: str) -> str:
+        return ""
 
     def compile(self, folder: Path, source: str, flags: Sequence[str] = ()) -> str:
         compiled = Path(source).with_suffix(".o").name
@@ -124,6 +133,14 @@ class Zig:
     @property
     def title(self) -> str:
         return f"clang of ziglang {_version(sys.executable, '-m', 'ziglang', 'version')}"
+
+    def remark(self, text: str) -> str:
+        if not _IN_DOUBLE.search(text):
+            return ""
+        return (
+            "sinf, cosf, tanf, expf, logf of ziglang's library compute in double: where the processor does not, they "
+            "cost many times those of a library for microcontrollers"
+        )
 
     def _machine(self) -> list[str]:
         return ["-target", self.target, f"-mcpu={self.cpu}", *self.flags]

@@ -162,3 +162,11 @@ def test_the_avr_program_holds_every_call(cv4):
     spec, files, log = cv4
     text = avr._main(make_job(spec, files, log))
     assert "order[] PROGMEM = { 1, 2, 1, 2, 1, 2 };" in text
+
+
+def test_what_ziglang_lacks_is_told():
+    pytest.importorskip("ziglang")
+    spec = loads(PARTIAL)
+    found = measure(spec, build(spec).files, simulate(spec, 2), compiler="zig")
+    assert found.remark.startswith("sinf, cosf")
+    assert found.functions["predict"].mean > 300  # a double sine without doubles

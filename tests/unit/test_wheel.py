@@ -40,7 +40,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_holds_the_package_and_nothing_else(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    files = [path for path in (ROOT / "kfgen").rglob("*") if path.suffix in (".py", ".j2", ".typed")]
+    files = [path for path in (ROOT / "kfgen").rglob("*") if path.suffix in (".py", ".j2", ".typed", ".h", ".zig")]
     ours = {str(path.relative_to(ROOT)) for path in files}
     templates = {f"kfgen/templates/{path.name}" for path in (ROOT / "templates").iterdir()}
     assert ours | templates <= names

@@ -166,7 +166,7 @@ class _Avr:
         struct = _size_of(linked, main)
         return Cost(
             job.name, job.scalar, self.name, chosen.title, tuple(flags), "cycles", functions, flash.get(own, 0),
-            flash.get(own, 0) + libraries, struct + ram.get(own, 0), errors,
+            flash.get(own, 0) + libraries, struct + ram.get(own, 0), errors, "",
             shared(job, functions, flash.get(own, 0)), figures["init"][0][1],
         )  # fmt: skip
 
