@@ -28,11 +28,12 @@ class Block:
 
 @dataclass(frozen=True)
 class ModeNote:
-    """What a reader wants to know of a mode. order: inner position -> state, where the generator has chosen it."""
+    """A mode of a bank. order: inner position -> state, where the generator has chosen it."""
 
     name: str
     description: str
     order: tuple[int, ...]
+    model: Model
 
 
 @dataclass(frozen=True)

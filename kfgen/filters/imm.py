@@ -60,7 +60,9 @@ class Imm:
         self.bank = bank
         self.model = bank.head
         self.scalar = scalar
-        self.lively = bank.lively(scalar.smallest)
+        # what is to stay above 0 must not become 0 by the rounding of mu
+        self.floor = max(bank.mu_floor, scalar.probability) if bank.mu_floor > 0 else bank.mu_floor
+        self.lively = bank.lively(scalar.smallest, scalar.probability)
         self.modes = [Mode(name, f, f.own_blocks()) for name, f in zip(bank.names, filters, strict=True)]
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
         fields = [
@@ -88,7 +90,7 @@ class Imm:
         notes = []
         for mode in self.modes:
             order = mode.filter.order if mode.filter.layout.reorders else straight
-            notes.append(ModeNote(mode.name, mode.filter.description(), tuple(order)))
+            notes.append(ModeNote(mode.name, mode.filter.description(), tuple(order), mode.model))
         return FilterCode(
             model=self.model,
             blocks=tuple(self.state.blocks()),
@@ -268,7 +270,7 @@ class Imm:
         total = assume_positive(t.name(sum(terms[1:], terms[0]), "mu_sum"))
         guards.finite(t, [total])
         after = [term / total for term in terms]
-        floor = self.bank.mu_floor
+        floor = self.floor
         if floor > 0:
             after = normalised([t.function("max", v, t.value(floor)) for v in after])
         after = [t.name(v, f"mu_{mode.name}_next") for mode, v in zip(self.modes, after, strict=True)]

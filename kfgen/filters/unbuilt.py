@@ -17,8 +17,6 @@ def unbuilt(spec: Spec) -> list[Mistake]:
     def place(key: str) -> Place:
         return filter_.places.get(key, filter_.place)
 
-    if spec.imm is not None and spec.scalar not in ("float", "double"):
-        refuse(spec.places.get("scalar", spec.place), f"imm with scalar: {spec.scalar}", "use float or double")
     code = spec.code
     if spec.imm is not None and code.unroll == "none":
         refuse(code.places.get("unroll", spec.place), "code.unroll: none with imm", "leave it out")

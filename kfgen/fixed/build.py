@@ -51,7 +51,7 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     spec = code.model.spec
     if log is not None:
         runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
-    weather = Weather(code.model)
+    weather = Weather(code)
     for seed, (gain, outliers, correlation, every) in enumerate(RUNS, 1):
         steps = LONG if seed == 1 and linear(code) else STEPS
         log_, rows = weather.log(steps, Random(seed, gain), Random(100 + seed, gain, outliers))
@@ -95,6 +95,8 @@ def linear(code: FilterCode) -> bool:
     """Whether the covariance is the same whatever is measured: a linear model of constant coefficients."""
     model = code.model
     options = model.options
+    if code.modes:
+        return False
     if options.influence is not None or options.inflation is not None or model.spec.filter.type != "kf":
         moving = {*model.symbols} - {"dt"}
         for e in (*model.f, *(h for s in model.sensors for h in s.h)):

@@ -44,6 +44,11 @@ def array_of(function: Function, name: str) -> Cell:
     return ("array", name) if name.startswith("kf.") else ("array", function.name, name)
 
 
+def plain(path: str) -> str:
+    """A field of a mode's filter as a filter by itself has it: kf.modes.turn.P is a kf.P."""
+    return "kf." + path.split(".", 3)[3] if path.startswith("kf.modes.") else path
+
+
 def number_of(function: Function, path: str) -> Cell:
     """The key of a number that a function is given."""
     if path.startswith(("kf.", "u.")) or path == "dt":

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import ceil, floor
 
-from kfgen.fixed.cells import Arrays, affine, array_of, number_of
+from kfgen.fixed.cells import Arrays, affine, array_of, number_of, plain
 from kfgen.fixed.formats import BITS, Formats
 from kfgen.fixed.unroll import boolean, fold, integer, make
 from kfgen.ir.nodes import Constants, Node, Table
@@ -247,7 +247,9 @@ class Expressions:
                 array = array_of(c.function, node.data)
                 place = make(node.op, (self.index(node.args[0]),), node.data)
                 cell = c.arrays.element(array, affine(node.args[0])[0])
-                raw = self.cell(place, cell, node.data in ("kf.x", "x", "P", "S"))
+                if node.data == "kf.mu":
+                    return self.probability(place)
+                raw = self.cell(place, cell, plain(node.data) in ("kf.x", "x", "P", "S"))
                 return replace(raw, low=0) if is_variance(node.data, node.args[0]) else raw
             case "read":
                 if not node.args:
@@ -278,6 +280,12 @@ class Expressions:
         e = self.c.formats.of(cell)
         low, high = (LEAST, LIMIT) if outside else (-INSIDE, INSIDE)
         return Raw(node, -self.c.formats.bits if e is None else e, low, high)
+
+    def probability(self, node: Node) -> Raw:
+        """One that the user may have set: brought between 0 and 1."""
+        one = 1 << self.c.formats.bits
+        node = make("q_min", (make("q_max", (node, constant(0))), constant(one)))
+        return Raw(node, -self.c.formats.bits, 0, one)
 
     def literal(self, value: Fraction, e: int | None) -> Raw:
         if value == 0:
@@ -635,7 +643,7 @@ class Expressions:
             case "const":
                 return bool(node.data >= 0)
             case "element":
-                return is_variance(node.data, node.args[0])
+                return node.data == "kf.mu" or is_variance(node.data, node.args[0])
             case "sum" | "add":
                 return all(sign > 0 and (self.nonnegative(f[0]) if len(f) == 1 else self._square(*f))
                            for sign, f in self.terms(node))  # fmt: skip
@@ -864,9 +872,9 @@ def _interval(a: Raw, b: Raw, s: int) -> tuple[int, int]:
 
 def is_variance(path: str, index: Node) -> bool:
     """Whether an element of the struct is a variance: what is stored there is never below zero."""
-    if path == "kf.D":
+    if plain(path) == "kf.D":
         return True
-    if path != "kf.P" or index.constant is None:
+    if plain(path) != "kf.P" or index.constant is None:
         return False
     place, j = int(index.constant), 0
     while j * (j + 3) // 2 < place:

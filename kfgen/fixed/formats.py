@@ -84,11 +84,11 @@ class Formats:
 
 
 def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, scale: Mapping[str, int] | None,
-           linear: bool, noise: list[float]) -> Formats:  # fmt: skip
+           linear: bool, noise: list[list[float]]) -> Formats:  # fmt: skip
     """The formats of the interface and of the covariance.
 
     scale: exponents of the states' units, where given. linear: the covariance does not depend on the data.
-    noise: what a step adds to each variance (n,).
+    noise: what a step adds to each variance (modes, n).
     """
     formats = Formats(arrays, ranges, bits, 0 if linear else MORE)
     _Interface(code, formats, scale or {}, noise).choose()
@@ -96,7 +96,8 @@ def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, scale: M
 
 
 class _Interface:
-    def __init__(self, code: FilterCode, formats: Formats, scale: Mapping[str, int], noise: list[float]) -> None:
+    def __init__(self, code: FilterCode, formats: Formats, scale: Mapping[str, int],
+                 noise: list[list[float]]) -> None:
         self.noise = noise
         self.code = code
         self.f = formats
@@ -120,6 +121,10 @@ class _Interface:
             self._quantity(("number", "dt"), "dt", float(high or 0), 4)
         z = {s.name: [self._component(s, k, x) for k in range(len(s.components))] for s in spec.measurements}
         one = -f.bits
+        for b, mode in enumerate(self.code.modes):
+            f.fixed[f.arrays.element(("array", "kf.mu"), b)] = one
+            for i in range(n):
+                f.fixed[f.arrays.element(("array", f"kf.modes.{mode.name}.x"), i)] = x[i]
         for name in ("nis", "log_likelihood"):
             f.fixed["number", f"kf.{name}"] = one
         f.fixed["number", "kf.t"] = -12
@@ -137,7 +142,7 @@ class _Interface:
             for i in range(m):
                 for j in range(m):
                     self._argument(f"get_R_{sensor}", "R", i * m + j, e[i] + e[j] + f.bits)
-        self._covariance()
+        self._covariances()
 
     def _argument(self, function: str, array: str, index: int, e: int) -> None:
         self.f.fixed[self.f.arrays.element(("array", function, array), index)] = e
@@ -196,15 +201,23 @@ class _Interface:
             declared = max(declared, self._limit(self.spec.states[i].range))
         return self._quantity(cell, f"{model.name}.{c.name}", declared, HEADROOM + 1)
 
-    def _covariance(self) -> None:
-        """P_ij at the mean of P_ii and P_jj, which bound it."""
+    def _covariances(self) -> None:
+        if not self.code.modes:
+            self._covariance("", self.code.order, self.noise[0])
+            return
+        for mode, noise in zip(self.code.modes, self.noise, strict=True):
+            self._covariance(f"modes.{mode.name}.", mode.order, noise)
+
+    def _covariance(self, place: str, order: tuple[int, ...], noises: list[float]) -> None:
+        """P_ij at the mean of P_ii and P_jj, which bound it. place: of the filter in the struct."""
         f, n = self.f, len(self.model.states)
-        fields = {block.name for block in self.code.blocks}
+        names = {block.name for block in self.code.blocks}
+        fields = {name for name in ("D", "P", "S") if place + name in names}
         for j in range(n):  # head-room gives way to the process noise, which must not be rounded away
-            state = self.code.order[j]
+            state = order[j]
             index = j if "D" in fields else j * (j + 3) // 2
-            cell = f.arrays.element(("array", "kf.D" if "D" in fields else "kf.P"), index)
-            e, largest, noise = f.of(cell), f.ranges.largest(cell), self.noise[state]
+            cell = f.arrays.element(("array", f"kf.{place}D" if "D" in fields else f"kf.{place}P"), index)
+            e, largest, noise = f.of(cell), f.ranges.largest(cell), noises[state]
             if "S" not in fields and e is not None and noise > 0:
                 wanted = math.frexp(noise)[1] - 1 - KEPT
                 f.fixed[cell] = max(min(e, wanted), exponent(1.05 * largest, 0))
@@ -212,9 +225,9 @@ class _Interface:
             return
         diagonal = []
         for j in range(n):
-            cell = f.arrays.element(("array", "kf.P"), j * (j + 3) // 2)
+            cell = f.arrays.element(("array", f"kf.{place}P"), j * (j + 3) // 2)
             diagonal.append(f.ranges.largest(cell))
         for j in range(n):
             for i in range(j + 1):
-                cell = f.arrays.element(("array", "kf.P"), j * (j + 1) // 2 + i)
+                cell = f.arrays.element(("array", f"kf.{place}P"), j * (j + 1) // 2 + i)
                 f.ranges.see(cell, math.sqrt(diagonal[i] * diagonal[j]))

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import cast
 
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.cells import Cell, affine, array_of, number_of
+from kfgen.fixed.cells import Cell, affine, array_of, number_of, plain
 from kfgen.fixed.expressions import DYNAMIC, LIMIT, Context, Expressions, QTable, Tally, constant, is_variance, nearest
 from kfgen.fixed.formats import BITS, Formats
 from kfgen.fixed.unroll import make
@@ -271,7 +271,7 @@ class _Statements:
         return name in self.ties and self._is_outside(self.ties[name])
 
     def _is_outside(self, cell: Cell) -> bool:
-        if cell[1] in ("kf.x", "kf.nis", "kf.log_likelihood"):
+        if plain(str(cell[1])) in ("kf.x", "kf.nis", "kf.log_likelihood"):
             return True
         return cell[0] == "array" and cell[2] in ("P", "S", "Q", "R") and not self.f.private
 

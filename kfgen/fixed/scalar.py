@@ -30,6 +30,7 @@ class Fixed:
     def __init__(self, name: str, rounding: str = arithmetic.NEAREST) -> None:
         self.name = name
         self.bits = int(name.partition(".")[2])
+        self.probability = Fraction(1, 2**self.bits)
         self.rounding = rounding
         self.status = Status()
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 from kfgen.filters import process
+from kfgen.filters.base import FilterCode
 from kfgen.filters.process import Step
 from kfgen.filters.sensor import SensorCode, total
 from kfgen.fixed.cells import find_arrays
@@ -22,23 +23,30 @@ from kfgen.model import Model
 from kfgen.spec.constants import value
 
 JITTER = 0.1
+DWELL = 30
 
 
 class Weather:
-    """Draws logs of a model. Columns are named as in a log file."""
+    """Draws logs of a filter's model. Columns are named as in a log file.
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
+    The truth of a bank follows its modes in turn, each for DWELL rows or so.
+    """
+
+    def __init__(self, code: FilterCode) -> None:
+        self.model = model = code.model
+        self.models = [mode.model for mode in code.modes] or [model]
         self.spec = model.spec
         self.n = len(model.states)
         self.run_time = model.spec.dt is not None and model.spec.dt.run_time
-        functions = [self._step(), *(self._sensor(k) for k in range(len(model.sensors)))]
+        functions = []
+        for b, mode in enumerate(self.models):
+            functions += [self._step(mode, b), *(self._sensor(mode, b, k) for k in range(len(model.sensors)))]
         self.program = RealProgram(functions, find_arrays(functions), Ranges())
         self.limits = [self._limits(i) for i in range(self.n)]
         self.last = [0.0] * self.n**2  # Q of the last step
 
-    def _step(self) -> Function:
-        t, model, n = Trace(), self.model, self.n
+    def _step(self, model: Model, b: int) -> Function:
+        t, n = Trace(), self.n
         step = Step(t.field("dt") if self.run_time else None if model.dt is None else t.value(model.dt))
         result = process.advance(t, model, process.given(t, model, step), step)
         for i in range(n):
@@ -48,10 +56,10 @@ class Weather:
                 for w, d in result.noise:
                     total_ = total_ + w[i] * d * w[j]
                 t.store("out.Q", i * n + j, t.value(total_))
-        return Function("step", [], schedule(t), "", returns="void")
+        return Function(f"step_{b}", [], schedule(t), "", returns="void")
 
-    def _sensor(self, k: int) -> Function:
-        t, model = Trace(), self.model
+    def _sensor(self, model: Model, b: int, k: int) -> Function:
+        t = Trace()
         sensor = model.sensors[k]
         code = SensorCode(t, model, sensor, list(range(self.n)))
         linear = code.linearise(code.prior())
@@ -60,12 +68,12 @@ class Weather:
             t.store("out.z", i, linear.predicted[i].value)
             for j in range(m):
                 t.store("out.R", i * m + j, t.value(R[i][j]))
-        return Function(f"see_{k}", [], schedule(t), "", returns="void")
+        return Function(f"see_{b}_{k}", [], schedule(t), "", returns="void")
 
-    def log(self, rows: int, random: Random, reading: Random) -> tuple[dict[str, list[float]], int]:
+    def log(self, rows: int, random: Random, reading: Random, first: int = 0) -> tuple[dict[str, list[float]], int]:
         """Columns, and how many rows there are: fewer than asked for where the model leaves the numbers.
 
-        random: for the truth; reading: for the noise of the sensors.
+        random: for the truth; reading: for the noise of the sensors; first: the mode to begin with.
         """
         model, n = self.model, self.n
         memory = Memory({"kf.x": [], "out.x": [0.0] * n, "out.Q": [0.0] * n * n}, {"kf.steps": 0, "kf.t": 0.0})
@@ -78,15 +86,18 @@ class Weather:
         columns: dict[str, list[float]] = {c: [] for c in ("t", *model.inputs, *names)}
         inputs = [self._input(i, random) for i in range(len(model.inputs))]
         nominal = float(value(self.spec.dt.nominal.tree, self.spec)) if self.spec.dt is not None else 1.0
-        now, k = 0.0, 0
+        now, k, mode, left = 0.0, 0, first, self._dwell(random)
         for k in range(rows):
+            if left == 0:
+                mode, left = (mode + 1) % len(self.models), self._dwell(random)
+            left -= 1
             for name, (middle, amplitude, waves) in zip(model.inputs, inputs, strict=True):
                 drive = sum(math.sin(2 * math.pi * k / period + phase) for period, phase in waves) / len(waves)
                 memory.numbers[f"u.{name}"] = middle + amplitude * drive
             if k or not self.run_time:
                 dt = self._clamped(nominal * (1 + JITTER * (2 * random.random() - 1))) if self.run_time else nominal
                 memory.numbers["dt"] = dt
-                self.program.run("step", memory)
+                self.program.run(f"step_{mode}", memory)
                 after = list(memory.arrays["out.x"])
                 self.last = flat = memory.arrays["out.Q"]
                 noise = draw([flat[i * n : i * n + n] for i in range(n)], random)
@@ -102,7 +113,7 @@ class Weather:
             for i, sensor in enumerate(model.sensors):
                 m = len(sensor.h)
                 memory.arrays["out.z"], memory.arrays["out.R"] = [0.0] * m, [0.0] * (m * m)
-                self.program.run(f"see_{i}", memory)
+                self.program.run(f"see_{mode}_{i}", memory)
                 flat = memory.arrays["out.R"]
                 noise = draw([flat[r * m : r * m + m] for r in range(m)], reading)
                 for name, z, e, period in zip(self._names(sensor), memory.arrays["out.z"], noise, sensor.periods,
@@ -111,10 +122,17 @@ class Weather:
                     columns[name].append(z if period is None else math.remainder(z, float(period)))
         return columns, rows
 
-    def process_noise(self) -> list[float]:
-        """The variance that a step adds to each state (n,), at the initial state."""
-        self.log(1 + self.run_time, Random(1), Random(2))
-        return [max(self.last[i * self.n + i], 0.0) for i in range(self.n)]
+    def _dwell(self, random: Random) -> int:
+        """Rows for which the truth keeps its mode; those of a filter by itself are without end."""
+        return -1 if len(self.models) == 1 else 1 + int(2 * DWELL * random.random())
+
+    def process_noise(self) -> list[list[float]]:
+        """The variance that a step of each mode adds to each state (modes, n), at the initial state."""
+        out = []
+        for first in range(len(self.models)):
+            self.log(1 + self.run_time, Random(1), Random(2), first)
+            out.append([max(self.last[i * self.n + i], 0.0) for i in range(self.n)])
+        return out
 
     def _names(self, sensor: object) -> list[str]:
         return [f"{sensor.name}.{c.name}" for c in sensor.spec.components]  # type: ignore[attr-defined]

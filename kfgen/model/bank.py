@@ -37,12 +37,14 @@ class BankModel:
     def sensors(self) -> tuple[tuple[SensorModel, ...], ...]:
         return tuple(zip(*(model.sensors for model in self.modes), strict=True))
 
-    def lively(self, smallest: Fraction) -> bool:
+    def lively(self, smallest: Fraction, unit: Fraction = Fraction(0)) -> bool:
         """Whether mu stays above a number whatever happens: after a prediction mu_j >= min_i M_ij, after an update
-        mu_j >= mu_floor, but for normalising."""
-        least = 2 * len(self.modes) * sympy.Rational(smallest.numerator, smallest.denominator)
+        mu_j >= mu_floor, but for normalising. unit: what mu is a multiple of; a floor of one lasts."""
+        bound = 2 * len(self.modes) * max(smallest, unit)
+        least = sympy.Rational(bound.numerator, bound.denominator)
         constant = all(e.is_number and e > least for row in self.transition for e in row)
-        return constant and all(m > least for m in (*self.mu0, self.mu_floor))
+        floored = self.mu_floor > (0 if unit else bound)
+        return constant and floored and all(m > bound for m in self.mu0)
 
 
 def build_bank(spec: Spec) -> BankModel:

@@ -21,6 +21,7 @@ class Scalar(Protocol):
     silent_ops: frozenset[str]  # routines of a fixed-point type that cannot saturate
     epsilon: Fraction  # relative spacing at 1
     smallest: Fraction  # the smallest number whose reciprocal is a number
+    probability: Fraction  # the smallest probability of a mode that is not 0; 0 where the type sets no such limit
 
     def literal(self, value: Fraction) -> str:
         """A constant, rounded once, as C reads it back to the same value."""

@@ -27,6 +27,7 @@ class Floating:
         self.size = info.bits // 8
         self.epsilon = Fraction(float(info.eps))
         self.smallest = Fraction(2) ** int(info.minexp)
+        self.probability = Fraction(0)
         self._mantissa = info.nmant + 1
         self._smallest = int(info.minexp) - info.nmant
 

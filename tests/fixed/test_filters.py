@@ -80,6 +80,14 @@ class Twin:
                 if name.startswith("kf.")}  # fmt: skip
 
 
+def raw_field(kf, name):
+    """The integers of a field, as its path in the struct names it."""
+    if name.startswith("modes."):
+        _, mode, field = name.split(".")
+        return next(m for m in kf.modes if m.name == mode).raw[field]
+    return kf.raw[name]
+
+
 def follow(text, scalar="q16.16", steps=120, **chosen):
     """Run C, interpreter and reference side by side; the largest error in sigma."""
     spec = override(loads(text) if "\n" in text else kfgen.load(text), scalar, filter=chosen)
@@ -95,6 +103,10 @@ def follow(text, scalar="q16.16", steps=120, **chosen):
         u = value.to_physical(raw, units.u)
         twin.memory.numbers.update({f"u.{n}": int(r) for n, r in zip(kf.inputs, raw, strict=True)})
         given = {"u": u} if kf.inputs else {}
+        if spec.dt is not None and spec.dt.run_time:
+            raw = value.to_raw(np.array(log.columns["t"][k] - log.columns["t"][k - 1] if k else 0.4), units.dt)
+            twin.memory.numbers["dt"] = int(raw)
+            given["dt"] = float(value.to_physical(raw, units.dt))
         assert kf.predict(**given) == twin.call("predict")
         ref.predict(**given)
         for sensor, components in kf.sensors.items():
@@ -104,7 +116,11 @@ def follow(text, scalar="q16.16", steps=120, **chosen):
             assert kf.update(sensor, z) == twin.call(f"update_{sensor}")
             ref.update(sensor, z)
         for name, values in twin.fields().items():
-            assert kf.raw[name].tolist() == values, (k, name)
+            assert raw_field(kf, name).tolist() == values, (k, name)
+        if spec.imm is not None:
+            assert np.all(kf.raw["mu"] > 0)
+            assert abs(np.sum(kf.raw["mu"]) - (1 << twin.scalar.bits)) <= len(kf.mu)
+            assert np.max(np.abs(kf.mu - ref.mu)) < 0.05
         worst = max(worst, float(np.max(np.abs(kf.x - ref.x) / np.sqrt(np.diag(ref.P)))))
         assert np.all(np.linalg.eigvalsh(kf.P) > 0)
     return worst
@@ -131,6 +147,50 @@ def test_other_formats(scalar):
 
 def test_sigma_points():
     assert follow("specs/pendulum.yaml", steps=60) < 0.1
+
+
+BANK = """
+kfgen: 1
+name: bank
+scalar: q16.16
+dt: 0.1
+states:
+  p: {init: 0, var: 0.1}
+  v: {init: 0, var: 0.1}
+  a: {init: 0, var: 0.1}
+measurements:
+  position: {z: {z: {h: p, var: 1}}}
+imm:
+  modes:
+    cv:
+      dynamics: {form: discrete, f: {p: p + v*dt}, Q: {p: 1e-6, v: 1e-6, a: 1e-6}}
+      filter: {type: ekf}
+    ca:
+      dynamics: {form: discrete, f: {p: p + (v + a*dt/2)*dt, v: v + a*dt}, Q: {p: 1e-6, v: 1e-6, a: 1e-6}}
+      filter: {type: ekf, covariance: full, update: joseph}
+  transition: [[0.95, 0.05], [0.05, 0.95]]
+  mu0: [0.5, 0.5]
+"""
+
+
+def test_banks():
+    assert follow(BANK, steps=80) < 0.02
+
+
+def test_banks_of_curved_models_and_dt():
+    assert follow("specs/beetle.yaml", steps=40) < 0.1
+
+
+def test_no_mode_is_stuck_at_zero():
+    """A mode that explains nothing for long keeps one LSB, and is back when it is the better one."""
+    kf = kfgen.compile(loads(BANK.replace("[[0.95, 0.05], [0.05, 0.95]]", "[[1, 0], [0, 1]]")))
+    least = 1 << 16
+    for k in range(400):
+        kf.predict()
+        kf.update("position", [0.0 if k < 100 else 0.02 * (k - 100) ** 2 / 2])
+        least = min(least, kf.raw["mu"].min())
+    assert least == 1
+    assert kf.mu[1] > 0.99
 
 
 def test_what_cannot_be_carried_is_refused_by_name():
