@@ -10,7 +10,7 @@ type can carry, so that what differs is the filters' own arithmetic.
   rounded to the scalar type after every call (or moved by its last digit), departs as well: eight times its departure
   is allowed, if that is more. Once that departs by more than the tolerance, nothing is left to compare: such a row is
   counted, and all go on from the first reference.
-* The error of P_ij is relative to sqrt(P_ii P_jj).
+* The error of P_ij is relative to sqrt(P_ii P_jj), in fixed point less one LSB of P at the interface.
 * A decision at a threshold (a gate, a robust weight) may fall differently by round-off. Such a difference is
   counted, and the compiled filter then goes on from the reference's estimate; more than 1 % of the calls, or
   any error bit that only one of the two returns, fails the check.
@@ -19,7 +19,7 @@ type can carry, so that what differs is the filters' own arithmetic.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -79,6 +79,7 @@ class Outcome:
     tolerance: float
     resolution: float  # what rounding x alone does to the reference, in sigma
     lost: int  # rows that could not be compared for it
+    certificate: tuple[str, ...] = ()  # fixed point: operations proved to fit, guarded, at risk
 
     @property
     def passed(self) -> bool:
@@ -92,27 +93,34 @@ class Outcome:
         def place(worst: Worst) -> str:
             return f" ({worst.where})" if worst.where else ""
 
-        lines = [
+        out = [
             f"{self.name} ({self.scalar}): {self.steps} steps, {self.calls} calls against the reference",
             f"  x: error at most {self.x.error:.1e} sigma{place(self.x)}",
             f"  P: error at most {self.P.error:.1e} of sqrt(P_ii P_jj){place(self.P)}",
         ]
         if self.differences:
-            lines.append(f"  status: differs in {len(self.differences)} calls, first in {self.differences[0]}")
+            out.append(f"  status: differs in {len(self.differences)} calls, first in {self.differences[0]}")
         if 8 * self.resolution > self.tolerance:
-            lines.append(f"  a reference with its x rounded to {self.scalar}: {self.resolution:.1e} sigma")
+            out.append(f"  a reference with its x rounded to {self.scalar}: {self.resolution:.1e} sigma")
         if self.lost:
-            lines.append(f"  {self.lost} steps not compared: rounding alone moves the reference further than that")
+            out.append(f"  {self.lost} steps not compared: rounding alone moves the reference further than that")
+        out += [f"  {line}" for line in self.certificate]
         verdict = "passed" if self.passed else "FAILED"
-        return "\n".join([*lines, f"  tolerance {self.tolerance:.0e}: {verdict}"])
+        return "\n".join([*out, f"  tolerance {self.tolerance:.0e}: {verdict}"])
 
 
 def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
     """Compile `spec` and compare it with the reference. KfgenError without a compiler; SpecError."""
-    from kfgen.native import compile as build
+    from kfgen.generate import build
+    from kfgen.native import load_filters
     from kfgen.reference import reference
 
-    return compare(build(spec), reference(spec), steps, seed, reference(spec))
+    generated = build(spec)
+    kf = load_filters([(spec, generated.files)])[0]
+    outcome = compare(kf, reference(spec), steps, seed, reference(spec))
+    if generated.fixed is None:
+        return outcome
+    return replace(outcome, certificate=generated.fixed.certified())
 
 
 def compare(
@@ -230,6 +238,8 @@ class _Scales:
         dtype = kf._value.dtype
         floating = dtype.kind == "f"
         self._dtype = dtype if floating else np.dtype(np.float64)
+        self._lsb = None if floating else kf._units.x
+        self._P_lsb = 0.0 if floating else kf._units.P
         self._relative = 8 * float(np.finfo(dtype).eps) if floating else 0.0
         self._absolute = np.zeros(n) if floating else 4 * kf._units.x
         self._magnitude = np.abs(ref.x)
@@ -237,6 +247,9 @@ class _Scales:
 
     def rounded(self, x: Array) -> Array:
         """x [n] as the scalar type carries it; where that is x itself, with its last digit moved."""
+        if self._lsb is not None:
+            nearest: Array = np.floor(x / self._lsb + 0.5) * self._lsb
+            return nearest
         rounded: Array = x.astype(self._dtype).astype(np.float64)
         return np.nextafter(rounded, np.inf) if self._dtype == np.float64 else rounded
 
@@ -259,5 +272,6 @@ class _Scales:
         # a variance that has come down to round-off of what it was is as good as zero
         floor = np.maximum(variance, np.maximum(self._relative, 1e-12) * self._variance)
         scale = np.sqrt(np.outer(floor, floor))
-        errors: Array = (np.abs(P - truth) / np.where(scale > 0, scale, 1.0))[self._upper]
+        beyond = np.maximum(np.abs(P - truth) - self._P_lsb, 0.0)
+        errors: Array = (beyond / np.where(scale > 0, scale, 1.0))[self._upper]
         return errors

@@ -10,10 +10,11 @@ from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed import tables
 from kfgen.fixed.cells import find_arrays
-from kfgen.fixed.expressions import Tally, size_of
+from kfgen.fixed.certificate import Certificate, certify, lines
+from kfgen.fixed.expressions import size_of
 from kfgen.fixed.formats import Formats, choose
 from kfgen.fixed.lowering import lower
-from kfgen.fixed.probe import probe
+from kfgen.fixed.probe import Departure, probe
 from kfgen.fixed.random import Random
 from kfgen.fixed.real import Ranges, RealProgram
 from kfgen.fixed.routines import closure
@@ -38,8 +39,12 @@ class FixedFilter:
     code: FilterCode
     real: FilterCode
     formats: Formats
-    tallies: dict[str, Tally]
+    certificates: tuple[Certificate, ...]  # of its functions
     view: FixedPoint
+
+    def certified(self) -> tuple[str, ...]:
+        """The certificates as a table."""
+        return lines(self.certificates)
 
 
 def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> FixedFilter:
@@ -60,19 +65,19 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     scale = None if spec.fixed.scale is None else _exponents(code)
     formats = choose(real, arrays, ranges, scalar.bits, scale, linear(code), noise)
     lowered = lower(real, formats)
-    _judge(runner.program, real, lowered.code, formats, scalar, weather)
+    found = _judge(runner.program, real, lowered.code, formats, scalar, weather)
     view = FixedPoint(scalar.bits, _units(lowered.code, formats), _table(formats), scalar.rounding == "floor", closure,
                       tables)  # fmt: skip
-    return FixedFilter(lowered.code, real, formats, lowered.tallies, view)
+    return FixedFilter(lowered.code, real, formats, certify(lowered.code.functions, found.peaks), view)
 
 
 def _judge(program: RealProgram, real: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed,
-           weather: Weather) -> None:  # fmt: skip
-    """SpecError where the integers do not follow the real numbers."""
+           weather: Weather) -> Departure:  # fmt: skip
+    """Try the integers beside the real numbers. SpecError where they do not follow."""
     log, rows = weather.log(PROBED, Random(11), Random(111))
     found = probe(program, real, integer, formats, scalar, log, rows)
     if found.sigmas <= FAILING and not found.errors:
-        return
+        return found
     state = real.model.spec.states[found.state]
     bits = max(1, math.ceil(math.log2(min(found.sigmas, 1e9) / FAILING))) if found.sigmas > FAILING else 1
     largest, least = _spread(formats, found.state, len(real.model.states))

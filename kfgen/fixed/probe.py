@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.cells import Arrays, Cell
+from kfgen.fixed.certificate import saturates
 from kfgen.fixed.formats import Formats
 from kfgen.fixed.real import Memory, Ranges, RealProgram, Source
 from kfgen.fixed.runs import Columns, blank
@@ -44,15 +46,19 @@ class _IntegerSource(Source):
         return f"(-{args[0]})" if node.op == "neg" else self.evaluated(node, args)
 
     def evaluated(self, node: Node, args: list[str]) -> str:
-        return self.new(f"E({node.op!r}, {self.program.data(node.data)}, [{', '.join(args)}])")
+        v = self.new(f"E({node.op!r}, {self.program.data(node.data)}, [{', '.join(args)}])")
+        if saturates(node):
+            self.emit(f"if not abs({v}) <= M.get({id(node)}, -1): M[{id(node)}] = abs({v})")
+        return v
 
 
 class IntegerProgram(RealProgram):
-    """The functions of an integer filter on Python integers."""
+    """The functions of an integer filter on Python integers. peaks: see `certificate.certify`."""
 
     def __init__(self, functions: list[Function], arrays: Arrays, scalar: Fixed) -> None:
         self.scalar = scalar
-        super().__init__(functions, arrays, Ranges(), _IntegerSource, {"E": scalar.evaluate})
+        self.peaks: dict[int, int] = {}
+        super().__init__(functions, arrays, Ranges(), _IntegerSource, {"E": scalar.evaluate, "M": self.peaks})
 
     def data(self, data: object) -> str:
         if data is None or isinstance(data, tuple):
@@ -71,13 +77,15 @@ class Departure:
     sigmas: float
     row: int
     errors: int  # calls that only the integers refused
+    peaks: Mapping[int, int] = field(default_factory=dict)  # see `certificate.certify`
 
 
 def probe(real: RealProgram, code: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed, log: Columns,
           rows: int) -> Departure:  # fmt: skip
     """Run both over a log, each from its own init."""
     program = IntegerProgram(list(integer.functions), formats.arrays, scalar)
-    return _Probe(real, program, code, formats).run(log, rows)
+    found = _Probe(real, program, code, formats).run(log, rows)
+    return replace(found, peaks=program.peaks)
 
 
 class _Probe:
@@ -85,6 +93,7 @@ class _Probe:
         self.real = real
         self.integer = integer
         self.code = code
+        self.names = {f.name for f in code.functions}
         self.spec = code.model.spec
         self.formats = formats
         self.a = blank(code)
@@ -129,7 +138,23 @@ class _Probe:
             state, sigmas = self._error(n)
             if not sigmas <= worst.sigmas:
                 worst = Departure(state, sigmas, k, 0)
+        self._others()
         return Departure(worst.state, worst.sigmas, worst.row, self.refused)
+
+    def _others(self) -> None:
+        """What the run has not needed, once, in integers only."""
+        for f in self.code.functions:
+            if f.private or f.name in ("init", "predict") or f"{f.name}_masked" in self.names:
+                continue
+            other = self.b.copy()
+            other.numbers["mask"] = 1
+            if f.name.startswith("set_"):
+                if f.name == "set_state":
+                    other.arrays["x"] = list(other.arrays["kf.x"])
+                elif f.name.replace("set_", "get_") in self.names:
+                    self.integer.run(f.name.replace("set_", "get_"), other)
+            if not f.name.startswith("update_") or f.name.endswith("_masked"):
+                self.integer.run(f.name, other)
 
     def _error(self, n: int) -> tuple[int, float]:
         variances = [math.inf] * n
