@@ -14,7 +14,7 @@
  * step: 1/3 s, compiled in
  *
  * RAM 60 bytes a filter. Operations:
- *   predict          60 mul, 35 add, 9 div, 3 compare, 1 cos, 6 select, 1 sin
+ *   predict          62 mul, 35 add, 9 div, 3 compare, 1 cos, 6 select, 1 sin
  *   update_position  58 mul, 40 add, 6 div, 2 compare
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
@@ -93,7 +93,7 @@ vehicle_tutorial_status_t vehicle_tutorial_init(vehicle_tutorial_t *kf);
  * @param kf  filter
  * @return VEHICLE_TUTORIAL_OK, or an error that leaves *kf as it was
  *
- * 60 mul, 35 add, 9 div, 3 compare, 1 cos, 6 select, 1 sin.
+ * 62 mul, 35 add, 9 div, 3 compare, 1 cos, 6 select, 1 sin.
  */
 vehicle_tutorial_status_t vehicle_tutorial_predict(vehicle_tutorial_t *kf);
 

@@ -91,7 +91,11 @@ def rank_one(U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]], safe
     weights = [d for _, d, _ in columns]
     for j in reversed(range(len(D))):
         steps = []
-        for c, w in enumerate(W):
+        # a pivot of zero starts with its own column: from another, that may hardly reach it, it would take a U without
+        # bounds, to which the next one loses its digits
+        first = sorted(range(len(W)), key=lambda c: columns[c][2] != j) if is_zero(D[j]) else range(len(W))
+        for c in first:
+            w = W[c]
             if not is_zero(weights[c]) and not is_zero(w[j]):
                 careful = safe or columns[c][2] == j or not is_positive(D[j])
                 s, b, t, D[j], weights[c] = _pivot(D[j], w[j], weights[c])
