@@ -12,10 +12,11 @@ from kfgen.emit.printer import WIDTH
 from kfgen.emit.render import render_c
 from kfgen.emit.view import View
 from kfgen.generate import Generated
-from kfgen.native.header import parse
-from kfgen.scalars import SCALARS, Scalar
-from kfgen.selftest.record import Record, record
-from kfgen.selftest.track import track_of
+from kfgen.native.header import Header, parse
+from kfgen.scalars import Scalar
+from kfgen.selftest.exact import record_exactly, scalar_of
+from kfgen.selftest.record import TOLERANCES, Record, record
+from kfgen.selftest.track import Track, track_of
 from kfgen.spec.constants import value
 from kfgen.spec.types import Spec
 
@@ -47,6 +48,18 @@ class Update:
 
 
 @dataclass(frozen=True)
+class Nearness:
+    """How near the numbers have to come, as literals."""
+
+    part: str  # the tolerance, for the reader
+    tolerance: str
+    resolution: str
+    square: str  # of the part of |x| that stands for a standard deviation where there is no covariance
+    two: str
+    small: tuple[str, str] | None  # tolerance and resolution where a double has four bytes
+
+
+@dataclass(frozen=True)
 class SelfTest:
     """What the template sees."""
 
@@ -61,25 +74,28 @@ class SelfTest:
     has_covariance: bool
     periods: tuple[tuple[str, str], ...]
     arrays: tuple[Array, ...]
-    exact: bool
-    part: str  # the tolerance, for the reader
-    tolerance: str
-    resolution: str
-    square: str  # of the part of |x| that stands for a standard deviation where there is no covariance
-    two: str
-    small: tuple[str, str] | None  # tolerance and resolution where a double has four bytes
+    near: Nearness | None  # None: to the bit
 
 
-def selftest(spec: Spec, generated: Generated) -> dict[str, str]:
-    """{`<name>_selftest.c`: text}. Pure. Raises KfgenError where the model does not get through one step."""
-    found = record(spec, track_of(spec))
-    made = _view(spec, generated, found)
+def selftest(spec: Spec, generated: Generated, track: Track | None = None, *, exact: bool = False) -> dict[str, str]:
+    """{`<name>_selftest.c`: text}. Pure. Raises KfgenError where the model does not get through one step.
+
+    track: what is replayed in place of a short simulated run. exact: compare to the bit with the program as it is
+    interpreted, which is always done in fixed point. In floating point that holds for filters that use no libm, where
+    the compiler contracts nothing (-ffp-contract=off).
+    """
+    track = track_of(spec) if track is None else track
+    header = parse(generated.files[f"{spec.name}.h"], spec.name)
+    if exact or spec.scalar not in TOLERANCES:
+        found = record_exactly(spec, generated.code, header, track)
+    else:
+        found = record(spec, track)
+    made = _view(spec, generated, header, found)
     return {f"{spec.name}_selftest.c": render_c("selftest.c.j2", s=made, v=made.view)}
 
 
-def _view(spec: Spec, generated: Generated, found: Record) -> SelfTest:
-    scalar = SCALARS[spec.scalar]
-    header = parse(generated.files[f"{spec.name}.h"], spec.name)
+def _view(spec: Spec, generated: Generated, header: Header, found: Record) -> SelfTest:
+    scalar, exact = scalar_of(spec), found.statuses is not None
     track = found.track
     sensors: list[Update] = []
     first = 0
@@ -96,23 +112,32 @@ def _view(spec: Spec, generated: Generated, found: Record) -> SelfTest:
     if "dt" in takes:
         arrays.insert(0, _array("steps", "dt", track.dt, scalar))
     arrays.append(_array("states", "x after each step", found.x.ravel(), scalar))
-    arrays.append(_array("scale", "the largest |x| of each state", abs(found.x).max(axis=0), scalar))
-    if found.variance is not None:
+    if found.statuses is not None:
+        arrays.append(_array("statuses", "the flags of each step's calls", found.statuses, scalar))
+    else:
+        arrays.append(_array("scale", "the largest |x| of each state", abs(found.x).max(axis=0), scalar))
+    if found.variance is not None and not exact:
         largest = np.maximum(found.variance.max(axis=0), found.initial)
         arrays.append(_array("spread", "the largest variance of each state", largest, scalar))
+    if found.variance is not None:
         arrays.append(_array("variances", "the diagonal of P after each step", found.variance.ravel(), scalar))
     kinds = [(state.name, state.period) for state in spec.states]
-    periods = [
+    periods = [] if exact else [
         (name, scalar.literal(Fraction(float(value(period.tree, spec)))))
         for name, period in kinds
         if period is not None
     ]
-    resolution = ULPS * scalar.epsilon
     return SelfTest(
         generated.view, f"{generated.view.command} --selftest", len(found.x), tuple(i.name for i in spec.inputs) if
         uses_u else (), tuple(sensors), first, "".join({"u": ", &u", "dt": ", dt"}[name] for name in takes),
-        "dt" in takes, found.variance is not None, tuple(periods), tuple(arrays), found.exact,
-        f"{found.tolerance:g}", scalar.literal(Fraction(str(found.tolerance))), scalar.literal(resolution),
+        "dt" in takes, found.variance is not None, tuple(periods), tuple(arrays),
+        None if exact else _nearness(spec, scalar, found.tolerance),
+    )  # fmt: skip
+
+
+def _nearness(spec: Spec, scalar: Scalar, tolerance: float) -> Nearness:
+    return Nearness(
+        f"{tolerance:g}", scalar.literal(Fraction(str(tolerance))), scalar.literal(ULPS * scalar.epsilon),
         scalar.literal(Fraction(1, 10000)), scalar.literal(Fraction(2)),
         ("1e-2", "2e-6") if spec.scalar == "double" else None,
     )  # fmt: skip

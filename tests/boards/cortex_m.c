@@ -4,8 +4,12 @@
 int main(void);
 void start(void);
 
+#ifndef STACK
+#define STACK 0x20400000u /* where it begins, at the end of the memory */
+#endif
+
 extern const uintptr_t vectors[16];
-__attribute__((section(".vectors"))) const uintptr_t vectors[16] = { 0x20400000u, (uintptr_t)start };
+__attribute__((section(".vectors"))) const uintptr_t vectors[16] = { STACK, (uintptr_t)start };
 
 void start(void)
 {

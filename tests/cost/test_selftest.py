@@ -13,15 +13,14 @@ from kfgen.generate import build
 from kfgen.override import override
 from kfgen.selftest import selftest
 from kfgen.spec import load, loads
+from tests.boards.machines import BOARDS
 
 ROOT = Path(__file__).parents[2]
-BOARDS = ROOT / "tests" / "boards"
 SPECS = sorted((ROOT / "specs").glob("*.yaml"))
 STRICT = [
     "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow",
     "-Wfloat-equal", "-Wundef", "-Werror",
 ]  # fmt: skip
-EMBEDDED = ["-O1", "-std=gnu99", "-fno-math-errno", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections"]
 
 
 def files_of(spec) -> dict[str, str]:
@@ -78,51 +77,19 @@ def test_every_spec_passes_on_the_host(everything, scalar):
     assert run(folder, "./tests").returncode == 0
 
 
-CORTEX = {
-    "m4f": ("mps2-an386", ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]),
-    "m3": ("mps2-an385", ["-mcpu=cortex-m3", "-mthumb", "-O0"]),
-}
-
-
-@pytest.mark.parametrize("core", CORTEX)
-def test_every_spec_passes_on_an_emulated_cortex_m(everything, needs, core):
-    needs("arm-none-eabi-gcc", "qemu-system-arm")
+@pytest.mark.parametrize("board", ["m4f", "m3", "rv32"])
+def test_every_spec_passes_on_an_emulated_board(everything, needs, board):
+    needs(*BOARDS[board].tools)
     folder = everything["own"]
-    board, machine = CORTEX[core]
-    compiled(
-        folder, "arm-none-eabi-gcc", *EMBEDDED, *machine, *sources(folder), "main.c", BOARDS / "cortex_m.c", "-lm",
-        "-specs=nosys.specs", "-nostartfiles", "-Wl,--section-start=.vectors=0,-Ttext=0x400",
-        "-Wl,-Tdata=0x20000000,-e,start,-u,vectors",
-        "-o", f"{core}.elf",
-    )  # fmt: skip
-    options = ["-nographic", "-semihosting-config", "enable=on,target=native", "-kernel", f"{core}.elf"]
-    assert run(folder, "qemu-system-arm", "-M", board, *options).returncode == 0
-
-
-def test_every_spec_passes_on_an_emulated_risc_v(everything, needs):
-    needs("riscv64-unknown-elf-gcc", "qemu-system-riscv32")
-    folder = everything["own"]
-    compiled(
-        folder, "riscv64-unknown-elf-gcc", "-march=rv32imc", "-mabi=ilp32", "--specs=picolibc.specs", *EMBEDDED,
-        *sources(folder), "main.c", BOARDS / "riscv.c", "-lm", "-nostartfiles",
-        "-Wl,--section-start=.vectors=0x80000000,--defsym=__flash=0x80001000,--defsym=__flash_size=0x200000",
-        "-Wl,--defsym=__ram=0x80200000,--defsym=__ram_size=0x100000,-e,_start", "-o", "riscv.elf",
-    )  # fmt: skip
-    options = ["-M", "virt", "-bios", "none", "-nographic", "-kernel", "riscv.elf"]
-    assert run(folder, "qemu-system-riscv32", *options).returncode == 0
+    assert BOARDS[board].status(folder, [*sources(folder), "main.c"]) == 0
 
 
 def test_every_spec_passes_on_an_emulated_avr(everything, needs):
     """Constants stay in flash. A double has four bytes there, with which the receiver's position cannot be told."""
-    needs("avr-gcc", "simavr")
+    needs(*BOARDS["avr"].tools)
     folder = everything["own"]
-    machine = ["-mmcu=atmega2560"]
-    compiled(folder, "avr-gcc", *machine, *EMBEDDED, *sources(folder), BOARDS / "avr.c", "-lm", "-o", "avr.elf")
-    told = run(folder, "simavr", "-m", "atmega2560", "-f", "16000000", "avr.elf")
-    assert re.findall(r"<(\d{4})>", told.stdout + told.stderr) == [
-        f"{1 << [path.stem for path in SPECS].index('gps'):04d}"
-    ]
-    data = run(folder, "avr-size", "-A", "avr.elf").stdout
+    assert BOARDS["avr"].status(folder, sources(folder)) == 1 << [path.stem for path in SPECS].index("gps")
+    data = run(folder, "avr-size", "-A", "program.elf").stdout
     used = sum(int(size) for name, size in re.findall(r"^\.(data|bss)\s+(\d+)", data, re.MULTILINE))
     assert used < 64
 

@@ -41,7 +41,8 @@ ALLOWED = {
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC | {"generate", "native", "override", "reference", "simulate", "status"},
     "cost": SPEC | {"logs", "native", "status"},
-    "selftest": SPEC | {"emit", "generate", "logs", "native", "reference", "scalars", "simulate"},
+    "selftest": SPEC
+    | {"emit", "filters", "fixed", "generate", "ir", "logs", "native", "reference", "scalars", "simulate", "status"},
     "layouts": {"emit"},
     "commands": SPEC
     | {"check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference", "selftest"}
