@@ -762,6 +762,8 @@ class Expressions:
             case "wrap":
                 a = self.value(node.args[0])
                 half = nearest(node.data / 2, a.e - 32)
+                if -half < a.low << 32 and a.high << 32 <= half:
+                    return a  # no number of that unit comes round
                 most = min(half >> 32, LIMIT)
                 return Raw(make("q_wrap", (a.node,), (half,)), a.e, -most, most)
             case "floor":

@@ -73,7 +73,7 @@ class Runner:
         return memory
 
     def _correlate(self, memory: Memory, correlation: float) -> None:
-        if "get_covariance" not in self.names:
+        if "set_covariance" not in self.names:
             return
         n = len(self.code.model.states)
         self.call("get_covariance", memory)
@@ -143,6 +143,7 @@ class Runner:
         other = memory.copy()
         if "get_covariance" in self.names:
             self.call("get_covariance", other)
+        if "set_covariance" in self.names:
             P = list(other.arrays["P"])
             n = len(self.code.model.states)
             for part in (P, [p if i % (n + 1) == 0 else 0.5 * p for i, p in enumerate(P)]):

@@ -11,11 +11,12 @@ import numpy as np
 from kfgen.emit.printer import WIDTH
 from kfgen.emit.render import render_c
 from kfgen.emit.view import View
+from kfgen.fixed.scalar import Fixed
 from kfgen.generate import Generated
 from kfgen.native.header import Header, parse
-from kfgen.scalars import Scalar
-from kfgen.selftest.exact import record_exactly, scalar_of
-from kfgen.selftest.record import TOLERANCES, Record, record
+from kfgen.scalars import SCALARS, Scalar
+from kfgen.selftest.exact import record_exactly
+from kfgen.selftest.record import Record, record
 from kfgen.selftest.track import Track, track_of
 from kfgen.spec.constants import value
 from kfgen.spec.types import Spec
@@ -77,25 +78,25 @@ class SelfTest:
     near: Nearness | None  # None: to the bit
 
 
-def selftest(spec: Spec, generated: Generated, track: Track | None = None, *, exact: bool = False) -> dict[str, str]:
+def selftest(spec: Spec, generated: Generated, track: Track | None = None) -> dict[str, str]:
     """{`<name>_selftest.c`: text}. Pure. Raises KfgenError where the model does not get through one step.
 
-    track: what is replayed in place of a short simulated run. exact: compare to the bit with the program as it is
-    interpreted, which is always done in fixed point. In floating point that holds for filters that use no libm, where
-    the compiler contracts nothing (-ffp-contract=off).
+    track: what is replayed, in place of a short simulated run. In fixed point every number must come out to the bit.
     """
     track = track_of(spec) if track is None else track
     header = parse(generated.files[f"{spec.name}.h"], spec.name)
-    if exact or spec.scalar not in TOLERANCES:
-        found = record_exactly(spec, generated.code, header, track)
+    scalar: Scalar
+    if spec.scalar in SCALARS:
+        scalar, found = SCALARS[spec.scalar], record(spec, track)
     else:
-        found = record(spec, track)
-    made = _view(spec, generated, header, found)
+        scalar = fixed = Fixed(spec.scalar, spec.fixed.rounding)
+        found = record_exactly(spec, generated.code, fixed, header, track)
+    made = _view(spec, generated, scalar, header, found)
     return {f"{spec.name}_selftest.c": render_c("selftest.c.j2", s=made, v=made.view)}
 
 
-def _view(spec: Spec, generated: Generated, header: Header, found: Record) -> SelfTest:
-    scalar, exact = scalar_of(spec), found.statuses is not None
+def _view(spec: Spec, generated: Generated, scalar: Scalar, header: Header, found: Record) -> SelfTest:
+    exact = found.statuses is not None
     track = found.track
     sensors: list[Update] = []
     first = 0
@@ -121,8 +122,8 @@ def _view(spec: Spec, generated: Generated, header: Header, found: Record) -> Se
         arrays.append(_array("spread", "the largest variance of each state", largest, scalar))
     if found.variance is not None:
         arrays.append(_array("variances", "the diagonal of P after each step", found.variance.ravel(), scalar))
-    kinds = [(state.name, state.period) for state in spec.states]
-    periods = [] if exact else [
+    kinds = [(state.name, state.period) for state in spec.states if not exact]
+    periods = [
         (name, scalar.literal(Fraction(float(value(period.tree, spec)))))
         for name, period in kinds
         if period is not None

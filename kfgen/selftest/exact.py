@@ -1,8 +1,6 @@
-"""What a filter has to answer along a track to the bit: its program, interpreted in its own arithmetic."""
+"""What a fixed-point filter has to answer along a track, to the bit: its program, interpreted."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -12,68 +10,58 @@ from kfgen.fixed.scalar import Fixed
 from kfgen.ir import interpret
 from kfgen.native.header import Header
 from kfgen.native.values import Units, value_of
-from kfgen.scalars import SCALARS, Scalar
 from kfgen.selftest.record import Record
 from kfgen.selftest.track import Track
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status
 
-_EMPTY = {"uint32": 0, "bool": False}
 _ALONE = int(Status.GATED)
 """With it, as with an error, nothing else is told: what was computed before is not stored."""
 
 
 class Twin:
-    """A filter as its program is interpreted: what the compiled C holds and returns, bit for bit."""
+    """A fixed-point filter as its program is interpreted: what the compiled C holds and returns, bit for bit."""
 
-    def __init__(self, code: FilterCode, scalar: Scalar) -> None:
+    def __init__(self, code: FilterCode, scalar: Fixed) -> None:
         self.scalar = scalar
         self.memory = interpret.Memory()
         self._functions = {each.name: each for each in code.functions}
-        n = len(code.model.states)
-        self.memory.arrays["P"] = [scalar.convert(0)] * n * n
+        spec = code.model.spec
+        self.memory.arrays["P"] = [0] * len(spec.states) ** 2
+        for name, indices in code.constants.items():
+            self.memory.arrays[f"{spec.name}_{name}"] = list(indices)
         for block in code.blocks:
-            empty = _EMPTY[block.kind] if block.kind in _EMPTY else scalar.convert(0)
             if block.size is None:
-                self.memory.numbers[f"kf.{block.name}"] = empty
+                self.memory.numbers[f"kf.{block.name}"] = False if block.kind == "bool" else 0
             else:
-                self.memory.arrays[f"kf.{block.name}"] = [empty] * block.size
+                self.memory.arrays[f"kf.{block.name}"] = [0] * block.size
 
     def call(self, function: str) -> int:
         """The status of a function, its arguments being in the memory."""
-        if isinstance(self.scalar, Fixed):
-            self.scalar.status.bits = 0
-        with np.errstate(all="ignore"):
-            flags = interpret.run(self._functions[function], self.scalar, self.memory)
+        self.scalar.status.bits = 0
+        flags = interpret.run(self._functions[function], self.scalar, self.memory)
         status = sum(int(Status[flag]) for flag in flags)
-        if status >= ERROR or status & _ALONE or not isinstance(self.scalar, Fixed):
-            return status
-        return status | self.scalar.status.bits
+        return status if status >= ERROR or status & _ALONE else status | self.scalar.status.bits
 
     @property
-    def x(self) -> list[Any]:
+    def x(self) -> list[int]:
         return list(self.memory.arrays["kf.x"])
 
     @property
-    def variances(self) -> list[Any]:
+    def variances(self) -> list[int]:
         """The diagonal of P."""
         self.call("get_covariance")
         P, n = self.memory.arrays["P"], len(self.memory.arrays["kf.x"])
         return [P[i * n + i] for i in range(n)]
 
 
-def scalar_of(spec: Spec) -> Scalar:
-    """The arithmetic of a spec's scalar type."""
-    return SCALARS[spec.scalar] if spec.scalar in SCALARS else Fixed(spec.scalar, spec.fixed.rounding)
-
-
-def record_exactly(spec: Spec, code: FilterCode, header: Header, track: Track) -> Record:
+def record_exactly(spec: Spec, code: FilterCode, scalar: Fixed, header: Header, track: Track) -> Record:
     """The record of a program, its track in raw numbers. KfgenError where not one step can be recorded."""
     value = value_of(header)
     units = Units(spec, value)
     u, dt = value.to_raw(track.u, units.u), value.to_raw(track.dt, units.dt)
     z = value.to_raw(track.z, np.concatenate([units.z[sensor.name] for sensor in spec.measurements]))
-    twin = Twin(code, scalar_of(spec))
+    twin = Twin(code, scalar)
     status = twin.call("init")
     covariance = header.has("get_covariance")
     xs, variances, statuses = [], [], []
@@ -93,17 +81,16 @@ def record_exactly(spec: Spec, code: FilterCode, header: Header, track: Track) -
     return Record(steps, x, variance, 0.0, np.zeros(x.shape[1]), tuple(statuses))
 
 
-def _step(spec: Spec, twin: Twin, u: list[Any], dt: Any, z: list[Any], k: int) -> int:
+def _step(spec: Spec, twin: Twin, u: list[int], dt: int, z: list[int], k: int) -> int:
     """The calls of a step; all that they tell."""
-    given, convert = twin.memory.numbers, twin.scalar.convert
-    given["dt"] = convert(dt)
-    given.update({f"u.{each.name}": convert(raw) for each, raw in zip(spec.inputs, u, strict=True)})
+    given = twin.memory.numbers
+    given.update({"dt": dt, **{f"u.{each.name}": raw for each, raw in zip(spec.inputs, u, strict=True)}})
     status, first = twin.call("predict"), 0
     for i, sensor in enumerate(spec.measurements):
         last = first + len(sensor.components)
         if k % (i + 1) == 0 and status < ERROR:
             names = [f"z.{each.name}" for each in sensor.components]
-            given.update({name: convert(raw) for name, raw in zip(names, z[first:last], strict=True)})
+            given.update(zip(names, z[first:last], strict=True))
             status |= twin.call(f"update_{sensor.name}")
         first = last
     return status

@@ -132,13 +132,14 @@ def built(folder: Path, files: dict[str, str], name: str, *options: str) -> Path
 
 @pytest.mark.parametrize(("text", "name"), [(VARIETY, "variety"), (STEADY, "steady")])
 def test_angles_exact_states_run_time_steps_and_steady_gains(tmp_path, text, name):
-    for scalar in ("float", "double"):
+    for scalar in ("float", "double", "q16.16"):
         files = files_of(override(loads(text), scalar))
         assert run(built(tmp_path / scalar, files, name, "-O1", "-std=c99", *STRICT), "./tests").returncode == 0
 
 
-def test_it_compiles_as_cplusplus(tmp_path):
-    files = files_of(loads(VARIETY))
+@pytest.mark.parametrize("scalar", ["float", "q16.16"])
+def test_it_compiles_as_cplusplus(tmp_path, scalar):
+    files = files_of(override(loads(VARIETY), scalar))
     for file, text in files.items():
         (tmp_path / file).write_text(text)
     (tmp_path / "main.cpp").write_text(
