@@ -39,8 +39,8 @@ _TABLES = {
     "order": "inner position -> index into x",
     "reach": "pair of columns of F U -> how many of its leading entries may differ from zero",
 }
-_QUIET = frozenset({"q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far", "q_abs"})
-OWN = frozenset({"abs", "min", "max", "sign", "count", "fma", "far", "fit", "mac"})
+_QUIET = frozenset({"q_min", "q_max", "q_sign", "q_count", "q_fma", "q_abs"})
+OWN = frozenset({"abs", "min", "max", "sign", "count", "fma", "fit", "mac"})
 """Routines of fixed point that stand in the template of the lowered program."""
 
 
@@ -255,7 +255,8 @@ class _ViewMaker:
         if self.fixed is None:
             return None
         used = {op.removeprefix("q_") for op in self.helpers if op.startswith("q_")}
-        used |= {"product", "round"} if used & {"fma", "far", "mac"} else set()
+        used |= {"product", "round"} if used & {"fma", "mac"} else set()
+        used |= {"fit"} if "mac" in used else set()
         own = tuple(sorted(used & OWN))
         return Routines(self.fixed.closure(used - OWN, self.fixed.floor), own, self.fixed.tables, self.fixed.floor)
 

@@ -25,7 +25,7 @@ DYNAMIC = 1024  # a reciprocal whose runs span more than this is made with each 
 FIRST = 17  # the least shift of a product that has been proved to fit
 ROOMIER = 3  # bits that a product may lose so that it is proved to fit
 UNSEEN = 4  # bits for a choice that no run has made
-LAST = 32  # the largest for which one form of it does
+LAST = 32  # the largest
 USEFUL = 20  # bits: a product of two full factors has no use for more than 62 less these
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
 
@@ -436,20 +436,29 @@ class Expressions:
                 rb = self.negative(rb)
         if total is None:
             return self._mul(ra, rb, s, e, most)
+        ra, rb, s, most = self._within(ra, rb, s, most)
         low, high = self.span(ra, rb, s, most if sign > 0 else None)
         if self.small(ra) and self.small(rb) and s >= FIRST:
             for begin in (total, self.fit(total)):
                 if begin.low + low >= -LIMIT and begin.high + high <= LIMIT:
                     self.c.tally.proved += 1
                     args = (begin.node, ra.node, rb.node)
-                    node = make("q_fma" if s <= LAST else "q_far", args, (s,))
-                    clipped = make("q_mac", args, (s,)) if self.small(begin) and s <= LAST else None
-                    return Raw(node, e, begin.low + low, begin.high + high, clipped)
-            if s <= LAST:
-                self.c.tally.guarded += 1
-                node = make("q_mac", (self.fit(total).node, ra.node, rb.node), (s,))
-                return Raw(node, e, max(total.low + low, -INSIDE), min(total.high + high, INSIDE))
+                    clipped = make("q_mac", args, (s,)) if self.small(begin) else None
+                    return Raw(make("q_fma", args, (s,)), e, begin.low + low, begin.high + high, clipped)
+            self.c.tally.guarded += 1
+            node = make("q_mac", (self.fit(total).node, ra.node, rb.node), (s,))
+            return Raw(node, e, max(total.low + low, -INSIDE), min(total.high + high, INSIDE))
         return self._plus(total, 1, self._mul(ra, rb, s, e, most), e)
+
+    def _within(self, a: Raw, b: Raw, s: int, most: int | None) -> tuple[Raw, Raw, int, int | None]:
+        """Factors of which one has so few digits that s is at most LAST: it costs 1/8 of the product's LSB."""
+        extra = s - LAST
+        if extra <= 0 or not (self.small(a) and self.small(b)):
+            return a, b, s, most
+        most = None if most is None else (most >> extra) + (1 << BITS)
+        if a.node.constant is None:
+            return self.at(a, a.e + extra), b, LAST, most
+        return a, self.at(b, b.e + extra), LAST, most
 
     def small(self, a: Raw) -> bool:
         return a.size <= INSIDE
@@ -470,12 +479,12 @@ class Expressions:
         return 0, (most + (1 << s >> 1)) >> s
 
     def _mul(self, a: Raw, b: Raw, s: int, e: int, most: int | None = None) -> Raw:
+        a, b, s, most = self._within(a, b, s, most)
         low, high = self.span(a, b, s, most)
         args = (constant(0), a.node, b.node)
         if self.small(a) and self.small(b) and s >= FIRST and low >= -LIMIT and high <= LIMIT:
             self.c.tally.proved += 1
-            clipped = make("q_mac", args, (s,)) if s <= LAST else None
-            return Raw(make("q_fma" if s <= LAST else "q_far", args, (s,)), e, low, high, clipped)
+            return Raw(make("q_fma", args, (s,)), e, low, high, make("q_mac", args, (s,)))
         if self.small(a) and self.small(b) and FIRST <= s <= LAST:
             self.c.tally.guarded += 1
             return Raw(make("q_mac", args, (s,)), e, max(low, -INSIDE), min(high, INSIDE))
@@ -515,9 +524,8 @@ class Expressions:
             exact = self.literal(value, e - rb.e)
         elif s < FIRST and exact.size << (FIRST - s) <= INSIDE:
             exact = self.literal(value, e - rb.e - FIRST)
-        elif s > 32:  # fewer digits of the constant, but 24 of them
-            exact = self.literal(value, max(e - rb.e - 32, min(exact.e + 6, e - rb.e - 32)) if s <= 38 else
-                                 e - rb.e - min(s - 6, 62))  # fmt: skip
+        elif s > LAST:  # fewer digits of the constant, but 22 of them
+            exact = self.literal(value, e - rb.e - max(LAST, min(s - 8, 62)))
         if exact.node.constant == 0:
             return None, None, 0, None
         return exact, rb, e - rb.e - exact.e, None

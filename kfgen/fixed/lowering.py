@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import cast
@@ -87,12 +88,15 @@ class Plan:
         self.exponent = exponent
         self.target = target
         self.wants: dict[str, list[int]] = {}
+        self.added: dict[str, list[int]] = {}
+        self.uses: Counter[str] = Counter()
         self.nodes: dict[str, Node] = {}
 
     def run(self, body: list[Statement]) -> None:
         for s in walk(body):
             if isinstance(s, Let) and s.node.kind == "real":
                 self.nodes[s.name] = self.c.nodes[s.name] = s.node
+            self.uses.update(variables(s))
         for s in reversed(list(walk(body))):
             if isinstance(s, Let) and s.node.kind == "real":
                 self._let(s)
@@ -113,6 +117,10 @@ class Plan:
                 e = self.c.planned[s.name] = min(fitting)
             elif min(wants) > natural + 2:  # finer than the products that it is in can use
                 e = self.c.planned[s.name] = min(min(wants) - 2, natural + 5)
+        added = self.added.get(s.name, [])
+        if e is None and s.node.op == "mul" and len(added) == self.uses[s.name] and natural is not None:
+            if added and min(added) > natural:  # its digits are dropped wherever it is added
+                e = self.c.planned[s.name] = min(added)
         self._visit(s.node, e)
 
     def _of(self, node: Node) -> int | None:
@@ -141,6 +149,8 @@ class Plan:
             for _, factors in terms:
                 if len(factors) == 1 and factors[0].op == "mul":
                     factors = factors[0].args
+                if len(factors) == 1 and factors[0].op == "variable" and e is not None:
+                    self.added.setdefault(factors[0].data, []).append(e)
                 if len(factors) == 2:
                     for a, b in (factors, factors[::-1]):
                         self._product(a, b, e)
@@ -332,17 +342,20 @@ class _Statements:
         return Call(self.done[s.callee.name], args)
 
 
+def variables(s: Statement) -> Iterator[str]:
+    """The names of the locals that a statement reads, as often as it does."""
+    stack = list(roots(s))
+    while stack:
+        node = stack.pop()
+        if node.op == "variable":
+            yield node.data
+        stack += node.args
+
+
 def alive(body: list[Statement]) -> list[Statement]:
     """Without locals that nobody reads, as those of guards that have vanished."""
     while True:
-        used: set[str] = set()
-        for s in walk(body):
-            stack = list(roots(s))
-            while stack:
-                node = stack.pop()
-                if node.op == "variable":
-                    used.add(node.data)
-                stack += node.args
+        used = {name for s in walk(body) for name in variables(s)}
         kept, dropped = _without(body, used)
         if not dropped:
             return kept

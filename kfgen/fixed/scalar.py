@@ -19,7 +19,7 @@ class Fixed:
 
     helpers = "helpers_q.j2"
     helper_ops = frozenset({"segment"})
-    silent_ops = frozenset({"q_abs", "q_min", "q_max", "q_sign", "q_count", "q_fma", "q_far"}) | {
+    silent_ops = frozenset({"q_abs", "q_min", "q_max", "q_sign", "q_count", "q_fma"}) | {
         f"q_{name}" for name in WITHOUT_STATUS
     }
     c_type = "int32_t"
@@ -50,7 +50,7 @@ class Fixed:
     def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
         if op.startswith(PREFIX):
             name = op.removeprefix(PREFIX)
-            if op in ("q_fma", "q_far"):
+            if op == "q_fma":
                 c, a, b = args
                 assert max(abs(a), abs(b)) <= INSIDE, "factors that were proved to be small are not"
                 return self._proved(c + arithmetic.scale(a * b, data[0], self.rounding))
@@ -72,15 +72,10 @@ class Fixed:
         return value if isinstance(value, bool) else self._proved(value)
 
     def _mac(self, args: list[int], s: int) -> int:
-        """c + a b / 2^s: the product clipped where it is beyond 2^30, then the sum."""
+        """c + a b / 2^s, clipped."""
         assert max(map(abs, args)) <= INSIDE
         c, a, b = args
-        product = a * b
-        if -(1 << (s + 30)) <= product < 1 << (s + 30):
-            total = c + arithmetic.scale(product, s, self.rounding)
-        else:
-            self.status.saturate()
-            total = c + (INSIDE if product > 0 else -INSIDE)
+        total = c + arithmetic.scale(a * b, s, self.rounding)
         if abs(total) > INSIDE:
             self.status.saturate()
         return max(-INSIDE, min(INSIDE, total))

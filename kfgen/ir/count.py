@@ -53,7 +53,7 @@ def _count(node: Node, counts: Counter[str]) -> None:
             counts["mul"] += sum(1 for _, factors in node.data if factors == 2)
         elif node.op in ("add", "sub", "q_add", "q_sub"):
             counts["add"] += 1
-        elif node.op in ("q_madd", "q_fma", "q_far", "q_mac"):
+        elif node.op in ("q_madd", "q_fma", "q_mac"):
             counts["add"] += 1
             counts["mul"] += 1
         elif node.op not in _FREE and node.op not in _SILENT:
