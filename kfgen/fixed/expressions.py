@@ -66,6 +66,7 @@ class Context:
     known: dict[str, Node] = field(default_factory=dict)  # integer and truth values that folded
     nodes: dict[str, Node] = field(default_factory=dict)  # the real expressions of locals
     planned: dict[str, int] = field(default_factory=dict)  # exponents of locals that make the products they are in fit
+    unlimited: set[str] = field(default_factory=set)  # locals that are only divided by, or compared
     signs: dict[Node, bool] = field(default_factory=dict)  # whether a value is known not to be negative
     inverses: dict[str, tuple[Raw, Node | None]] = field(default_factory=dict)  # 1/x, 0 unless the condition holds
     tally: Tally = field(default_factory=Tally)
@@ -355,6 +356,8 @@ class Expressions:
             needed = e if e is not None else max(self._guess(f) for _, f in terms)
         least = needed - 2 if e is not None else needed  # a store's own head-room is enough
         plain = [(sign, f[0]) for sign, f in terms if len(f) == 1 and not _is_product(f[0])]
+        if e is None:
+            needed += any(self.value(f).e == needed + 1 for _, f in plain if f.constant is None)
         if e is None or e < least:
             e = self._sum_format(terms, plain, needed) if e is None else needed
         products = [(sign, f) for sign, f in terms if len(f) == 2 or _is_product(f[0])]

@@ -87,7 +87,7 @@ def angle(y: int, x: int) -> int:
     n, d = (x, y) if swap else (y, x)
     z = 32 - d.bit_length()
     n, d = n << z, d << z
-    guess = 256 + tables.reciprocals()[(d >> 24) - 128]
+    guess = 256 + tables.quotients()[(d >> 24) - 128]
     j = ((n >> 24) * guess + 2048) >> 12
     above, below = 16 * n - j * d, 16 * d + j * n
     size = abs(above)

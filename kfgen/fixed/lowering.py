@@ -90,6 +90,7 @@ class Plan:
         self.wants: dict[str, list[int]] = {}
         self.added: dict[str, list[int]] = {}
         self.uses: Counter[str] = Counter()
+        self.unlimited: Counter[str] = Counter()
         self.nodes: dict[str, Node] = {}
 
     def run(self, body: list[Statement]) -> None:
@@ -117,6 +118,8 @@ class Plan:
                 e = self.c.planned[s.name] = min(fitting)
             elif min(wants) > natural + 2:  # finer than the products that it is in can use
                 e = self.c.planned[s.name] = min(min(wants) - 2, natural + 5)
+        if self.unlimited[s.name] == self.uses[s.name]:
+            self.c.unlimited.add(s.name)
         added = self.added.get(s.name, [])
         if e is None and s.node.op == "mul" and len(added) == self.uses[s.name] and natural is not None:
             if added and min(added) > natural:  # its digits are dropped wherever it is added
@@ -157,6 +160,10 @@ class Plan:
                 for f in factors:
                     self._visit(f, None)
             return
+        if node.op in ("div", "lt", "le", "finite") and node.args[-1].op == "variable":
+            self.unlimited[node.args[-1].data] += 1
+        if node.op in ("lt", "le") and node.args[0].op == "variable":
+            self.unlimited[node.args[0].data] += 1
         for a in node.args:
             self._visit(a, e if node.op == "select" else None)
 
@@ -268,7 +275,7 @@ class _Statements:
             if name not in self.ties and node.op == "mul":
                 e = self.x.roomier(node, e)
             raw = self.x.value(node, e)
-            if not self.outside(name):
+            if not self.outside(name) and name not in self.c.unlimited:
                 raw = self.x.fit(raw)
         if raw.node.constant is not None:
             self.c.locals[name] = raw

@@ -53,6 +53,12 @@ def series(function: Callable[[Any], Any], low: Any, high: Any, degree: int) -> 
 
 
 @cache
+def quotients() -> tuple[int, ...]:
+    """2^8/d - 2^8 for d = (i + 128.5)/2^8, i = 0..127: of two numbers' first bits the quotient, for arctangents."""
+    return tuple(floor(Fraction(2**17, 2 * i + 257) + Fraction(1, 2)) - 256 for i in range(128))
+
+
+@cache
 def reciprocals() -> tuple[int, ...]:
     """2^8/d - 2^8 for d = (i + 64.5)/2^7, i = 0..63: first guesses of 1/d in [1/2, 1), relative error 2^-6.7."""
     return tuple(floor(Fraction(2**16, 2 * i + 129) + Fraction(1, 2)) - 256 for i in range(64))
