@@ -121,9 +121,9 @@ class Plan:
         if self.unlimited[s.name] == self.uses[s.name]:
             self.c.unlimited.add(s.name)
         added = self.added.get(s.name, [])
-        if e is None and s.node.op == "mul" and len(added) == self.uses[s.name] and natural is not None:
-            if added and min(added) > natural:  # its digits are dropped wherever it is added
-                e = self.c.planned[s.name] = min(added)
+        dropped = natural is not None and bool(added) and min(added) > natural  # its digits, wherever it is added
+        if e is None and s.node.op == "mul" and len(added) == self.uses[s.name] and dropped:
+            e = self.c.planned[s.name] = min(added)
         self._visit(s.node, e)
 
     def _of(self, node: Node) -> int | None:
