@@ -1,0 +1,84 @@
+"""The multiply-adds of lowered programs: both ways to compute them give what the interpreter says, at every edge."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from cffi import FFI
+
+from kfgen.emit.render import macro
+from kfgen.fixed import tables
+from kfgen.fixed.routines import closure
+from kfgen.fixed.scalar import INSIDE, Fixed
+from tests.fixed.routines import COMPILERS, HEAD
+
+CALLS = """
+void macs(int n, const int32_t *c, const int32_t *a, const int32_t *b, const int32_t *s, int32_t *out, uint32_t *status)
+{
+    for (int i = 0; i < n; i++) { out[i] = t_q_mac(c[i], a[i], b[i], s[i], &status[i]); }
+}
+void fmas(int n, const int32_t *c, const int32_t *a, const int32_t *b, const int32_t *s, int32_t *out)
+{
+    for (int i = 0; i < n; i++) { out[i] = t_q_fma(c[i], a[i], b[i], s[i]); }
+}
+"""
+PROTOTYPES = "\n".join(line + ";" for line in CALLS.splitlines() if line.startswith("void"))
+
+
+def factors(source: random.Random) -> tuple[int, int, int, int]:
+    """c, a, b, s; half of them so that the sum is beside one of its limits."""
+    s = source.randint(17, 32)
+    a, b = (source.choice((-1, 1)) * source.getrandbits(source.randint(1, 30)) for _ in range(2))
+    a, b = (max(-INSIDE, min(INSIDE, v)) for v in (a, b))
+    c = source.randint(-INSIDE, INSIDE)
+    if source.random() < 0.5:
+        limit = source.choice((INSIDE, 24576 << 16, 2**31)) * source.choice((-1, 1)) + source.randint(-(2**17), 2**17)
+        c = limit - (a * b >> s)
+    return max(-INSIDE, min(INSIDE, c)), a, b, s
+
+
+@pytest.mark.parametrize("rounding", ["nearest", "floor"])
+@pytest.mark.parametrize("target", ["", "-D__ARM_ARCH_6M__"])
+def test_interpreter_and_c_agree(target, rounding, tmp_path):
+    floor = rounding == "floor"
+    routines = SimpleNamespace(own=("fit", "fma", "mac"), floor=floor)
+    view = SimpleNamespace(name="t", NAME="T", routines=routines, helpers=())
+    basic = macro("helpers_q.j2", "routines", "t", closure(["product", "round", "sar32"], floor), tables, "T_SATURATED",
+                  floor=floor)  # fmt: skip
+    head = HEAD + "#define T_SATURATED SATURATED\ntypedef uint32_t t_status_t;\n"
+    (tmp_path / "t.c").write_text(head + basic + macro("helpers_scaled.j2", "define", view) + CALLS)
+    flags = ["-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", *target.split()]
+    subprocess.run([COMPILERS[0], "-std=c99", *flags, "-shared", "-fPIC", "t.c", "-o", "t.so"], cwd=tmp_path, check=True)
+    ffi = FFI()
+    ffi.cdef(PROTOTYPES)
+    library = ffi.dlopen(str(tmp_path / "t.so"))
+    source, n = random.Random(3), 20000
+    rows = [factors(source) for _ in range(n)] + [(c, a, b, s) for c in (INSIDE, -INSIDE) for a in (INSIDE, -INSIDE)
+                                                  for b in (INSIDE, -INSIDE) for s in range(17, 33)]  # fmt: skip
+
+    def run(name, given, *status):
+        columns = [np.array(column, np.int32) for column in zip(*given, strict=True)]
+        out = np.zeros(len(given), np.int32)
+        pointers = [ffi.from_buffer("int32_t[]", each) for each in (*columns, out)]
+        getattr(library, name)(len(given), *pointers, *(ffi.from_buffer("uint32_t[]", each) for each in status))
+        return out.tolist()
+
+    scalar, wanted, flags_wanted, fitting = Fixed("q16.16", rounding), [], [], []
+    for c, a, b, s in rows:
+        scalar.status.bits = 0
+        wanted.append(scalar.evaluate("q_mac", (s,), [c, a, b]))
+        flags_wanted.append(scalar.status.bits)
+        exact = c + (a * b + (0 if floor else 1 << (s - 1)) >> s)
+        assert wanted[-1] == max(-INSIDE, min(INSIDE, exact))
+        if abs(exact) < 2**31:
+            fitting.append(((c, a, b, s), exact))
+    status = np.zeros(len(rows), np.uint32)
+    assert run("macs", rows, status) == wanted
+    assert status.tolist() == flags_wanted
+    assert any(flags_wanted)
+    assert not all(flags_wanted)
+    assert run("fmas", [row for row, _ in fitting]) == [value for _, value in fitting]
