@@ -52,7 +52,8 @@ def test_interpreter_and_c_agree(target, rounding, tmp_path):
     head = HEAD + "#define T_SATURATED SATURATED\ntypedef uint32_t t_status_t;\n"
     (tmp_path / "t.c").write_text(head + basic + macro("helpers_scaled.j2", "define", view) + CALLS)
     flags = ["-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", *target.split()]
-    subprocess.run([COMPILERS[0], "-std=c99", *flags, "-shared", "-fPIC", "t.c", "-o", "t.so"], cwd=tmp_path, check=True)
+    command = [COMPILERS[0], "-std=c99", *flags, "-shared", "-fPIC", "t.c", "-o", "t.so"]
+    subprocess.run(command, cwd=tmp_path, check=True)
     ffi = FFI()
     ffi.cdef(PROTOTYPES)
     library = ffi.dlopen(str(tmp_path / "t.so"))
