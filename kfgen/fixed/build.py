@@ -11,11 +11,11 @@ from kfgen.filters.base import FilterCode
 from kfgen.fixed import tables
 from kfgen.fixed.cells import find_arrays
 from kfgen.fixed.certificate import Certificate, certify, lines
-from kfgen.fixed.expressions import size_of
 from kfgen.fixed.formats import Formats, choose
 from kfgen.fixed.lowering import lower
 from kfgen.fixed.probe import Departure, probe
 from kfgen.fixed.random import Random
+from kfgen.fixed.raw import size_of
 from kfgen.fixed.real import Ranges, RealProgram
 from kfgen.fixed.routines import closure
 from kfgen.fixed.runs import Runner
