@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.fixed.formats import BITS
-from kfgen.fixed.raw import LIMIT, QTable, Raw, nearest, same
+from kfgen.fixed.raw import LIMIT, QTable, Raw, nearest, same, size_of
 from kfgen.fixed.sums import Sums
 from kfgen.fixed.unroll import make
 from kfgen.ir.nodes import Node
@@ -37,6 +37,7 @@ class Functions(Sums):
                 return Raw(make("q_sign", (a.node,)), 0, -1, 1)
             case "wrap":
                 a = self.value(node.args[0])
+                a = self.at(a, max(a.e, size_of(node.data / 2) - 30))  # half a period, to 32 bits more, is an int64_t
                 half = nearest(node.data / 2, a.e - 32)
                 most = min(half >> 32, LIMIT)
                 return Raw(make("q_wrap", (a.node,), (half,)), a.e, -most, most)
