@@ -42,6 +42,7 @@ class Summary:
 class Generated:
     files: dict[str, str]
     summary: Summary = field(default_factory=Summary)
+    fixed: None = None
 
 
 def generate(spec: Spec) -> dict[str, str]:
@@ -58,7 +59,7 @@ def generate(spec: Spec) -> dict[str, str]:
 def _generator(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
     module = ModuleType("kfgen.generate")
     module.generate = generate  # type: ignore[attr-defined]
-    module.build = lambda spec, log=None: Generated(generate(spec))  # type: ignore[attr-defined]
+    module.build = lambda spec, log=None: Generated(module.generate(spec))  # type: ignore[attr-defined]
     module.Generated = Generated  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "kfgen.generate", module)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp().parent / "kfgen-test-cache"))
