@@ -45,8 +45,7 @@ class Spread:
 
 def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Number], first: int) -> Spread:
     """Of modes whose weights sum to 1. first: the mode that the others join."""
-    n, count = len(model.states), len(states)
-    parts = [first, *(i for i in range(count) if i != first)]
+    parts = [first, *(i for i in range(len(states)) if i != first)]
     parts = [i for i in parts if not is_zero(weights[i])]
     base: list[Value] = list(states[parts[0]])
     straight = sorted(parts)
@@ -75,7 +74,7 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
         mean = [plus(m, times(share, d)) for m, d in zip(mean, e, strict=True)]
         if not last:
             weight = total
-    return Spread([t.value(plus(b, m)) for b, m in zip(base, mean, strict=True)], columns if n else [])
+    return Spread([t.value(plus(b, m)) for b, m in zip(base, mean, strict=True)], columns)
 
 
 def _heaviest(values: list[Value], weights: list[Number]) -> Value:
@@ -91,7 +90,7 @@ def mixed(t: Trace, parts: list[Estimate], weights: list[Number], spreads: Sprea
     layout = parts[own].layout
     columns = [(_ordered(column, layout), weight) for column, weight in spreads.columns]
     if not layout.factored:
-        dense = [_straight(part) for part in parts]
+        dense = [_Dense(part) for part in parts]
 
         def entry(a: int, b: int) -> Value:
             i, j = layout.order[a], layout.order[b]
@@ -127,10 +126,6 @@ def mixed(t: Trace, parts: list[Estimate], weights: list[Number], spreads: Sprea
 def _ordered(column: Vector, layout: Layout) -> Vector:
     """From the spec's order to the layout's."""
     return [column[i] for i in layout.order]
-
-
-def _straight(part: Estimate) -> _Dense:
-    return _Dense(part)
 
 
 class _Dense:

@@ -9,13 +9,9 @@ from kfgen.spec.types import Spec
 def unbuilt(spec: Spec) -> list[Mistake]:
     """One mistake for each thing asked for that is not built yet."""
     out: list[Mistake] = []
-    filter_ = spec.filter
 
     def refuse(place: Place, what: str, hint: str = "") -> None:
         out.append(Mistake(place, f"{what} is not built yet", hint))
-
-    def place(key: str) -> Place:
-        return filter_.places.get(key, filter_.place)
 
     code = spec.code
     if spec.imm is not None and code.unroll == "none":

@@ -65,10 +65,10 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     scale = None if spec.fixed.scale is None else _exponents(code)
     formats = choose(real, arrays, ranges, scalar.bits, scale, linear(code), noise)
     lowered = lower(real, formats)
-    found = _judge(runner.program, real, lowered.code, formats, scalar, weather)
-    view = FixedPoint(scalar.bits, _units(lowered.code, formats), _table(formats), scalar.rounding == "floor", closure,
+    found = _judge(runner.program, real, lowered, formats, scalar, weather)
+    view = FixedPoint(scalar.bits, _units(lowered, formats), _table(formats), scalar.rounding == "floor", closure,
                       tables)  # fmt: skip
-    return FixedFilter(lowered.code, real, formats, certify(lowered.code.functions, found.peaks), view)
+    return FixedFilter(lowered, real, formats, certify(lowered.functions, found.peaks), view)
 
 
 def _judge(program: RealProgram, real: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed,

@@ -54,14 +54,12 @@ class Functions(Sums):
         if op in _UNARY:
             a = self._placed(self.value(node.args[0]))
             out = min(max(e, -30), 0)
-            self.c.tally.guarded += 1
             return Raw(make(f"q_{op}", (a.node,), (-a.e, -out)), out)
         if op == "atan2":
             a, b = self.together(node.args)
         else:
             a, b = (self._placed(self.value(n)) for n in node.args)
         out = min(max(e, -30), 0)
-        self.c.tally.guarded += 1
         if op == "atan2":
             out = max(out, -29)
             return Raw(make("q_atan2", (a.node, b.node), (-out,)), out)
@@ -75,7 +73,6 @@ class Functions(Sums):
             raws = self.together(squares)
             total, shared = raws[0], raws[0].e
             for r in raws[1:]:
-                self.c.tally.guarded += 1
                 total = Raw(make("q_hypot", (total.node, r.node)), shared, 0, LIMIT)
             return total
         a = self.value(node.args[0])
@@ -86,7 +83,6 @@ class Functions(Sums):
             e += (s - 61) // 2
         elif s < -62:
             e -= (-s - 61) // 2
-        self.c.tally.guarded += 1
         return Raw(make("q_sqrt", (a.node,), (a.e - 2 * e,)), e, 0, LIMIT)
 
     def _squares(self, node: Node) -> list[Node] | None:

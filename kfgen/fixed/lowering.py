@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import cast
 
@@ -12,7 +12,7 @@ from kfgen.fixed.cells import Cell, affine, array_of, number_of, plain
 from kfgen.fixed.expressions import Expressions
 from kfgen.fixed.formats import Formats
 from kfgen.fixed.plan import Plan, variables
-from kfgen.fixed.raw import DYNAMIC, LIMIT, Context, QTable, Tally, constant, is_variance, nearest
+from kfgen.fixed.raw import DYNAMIC, LIMIT, Context, QTable, constant, is_variance, nearest
 from kfgen.fixed.unroll import make
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
@@ -36,24 +36,14 @@ from kfgen.ir.program import (
 STATUS = Argument("flags", "{name}_status_t", pointer=True, constant=False)
 
 
-@dataclass(frozen=True)
-class Lowered:
-    """An integer filter: its code, its tables in integers, and per function what was proved."""
-
-    code: FilterCode
-    tallies: dict[str, Tally]
-
-
-def lower(code: FilterCode, formats: Formats) -> Lowered:
+def lower(code: FilterCode, formats: Formats) -> FilterCode:
     """The filter in integers."""
     tables: dict[Table, QTable] = {}
     lookups: dict[Constants, tuple[Constants, int]] = {}
     done: dict[str, Function] = {}
-    tallies: dict[str, Tally] = {}
     for f in code.functions:
         context = Context(f, formats, formats.arrays, tables, lookups)
         done[f.name] = _Statements(context, done).function()
-        tallies[f.name] = context.tally
     blocks = []
     for block in code.blocks:
         initial = tuple(
@@ -61,12 +51,11 @@ def lower(code: FilterCode, formats: Formats) -> Lowered:
             for i, value in enumerate(block.initial)
         )
         blocks.append(replace(block, initial=initial))
-    lowered = replace(
+    return replace(
         code, blocks=tuple(blocks), functions=tuple(done.values()),
         tables=cast(Mapping[Table, str], {tables[t]: name for t, name in code.tables.items() if t in tables}),
         lookups={lookups[c][0]: name for c, name in code.lookups.items() if c in lookups}, constants={},
     )  # fmt: skip
-    return Lowered(lowered, tallies)
 
 
 def _raw(value: Fraction, e: int | None, bits: int) -> Fraction:

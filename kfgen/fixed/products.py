@@ -69,12 +69,9 @@ class Products(Values):
         low, high = self.span(a, b, s, most)
         args = (constant(0), a.node, b.node)
         if self.small(a) and self.small(b) and s >= FIRST and low >= -LIMIT and high <= LIMIT:
-            self.c.tally.proved += 1
             return Raw(make("q_fma", args, (s,)), e, low, high, make("q_mac", args, (s,)))
         if self.small(a) and self.small(b) and FIRST <= s <= LAST:
-            self.c.tally.guarded += 1
             return Raw(make("q_mac", args, (s,)), e, max(low, -INSIDE), min(high, INSIDE))
-        self.c.tally.guarded += 1
         return Raw(make("q_mul", (a.node, b.node), (s,)), e, max(low, -LIMIT), min(high, LIMIT))
 
     def _within(self, a: Raw, b: Raw, s: int, most: int | None) -> tuple[Raw, Raw, int, int | None]:
@@ -148,11 +145,9 @@ class Products(Values):
         high = total.high + (raw.high if sign > 0 else -raw.low)
         op = "add" if sign > 0 else "sub"
         if low >= -LIMIT and high <= LIMIT:
-            self.c.tally.proved += 1
             if total.node.op == "neg" and sign > 0:
                 return Raw(make("sub", (raw.node, total.node.args[0])), e, low, high)
             return Raw(make(op, (total.node, raw.node)), e, low, high)
-        self.c.tally.guarded += 1
         return Raw(make(f"q_{op}", (total.node, raw.node)), e, max(low, -LIMIT), min(high, LIMIT))
 
     def useful(self, node: Node, e: int | None) -> int | None:
@@ -236,7 +231,6 @@ class Products(Values):
     def _divided(self, a: Raw, b: Raw, e: int) -> Raw:
         """a / b at e."""
         s = a.e - b.e - e
-        self.c.tally.guarded += 1
         raw = a.node.constant
         if raw is not None and raw > 0 and (int(raw) & (int(raw) - 1)) == 0:
             bits = s + int(raw).bit_length() - 1

@@ -40,14 +40,6 @@ class Raw:
 
 
 @dataclass
-class Tally:
-    """How many operations of a function were proved to fit, and how many saturate."""
-
-    proved: int = 0
-    guarded: int = 0
-
-
-@dataclass
 class Context:
     """What the expressions of one function are lowered with."""
 
@@ -63,7 +55,6 @@ class Context:
     unlimited: set[str] = field(default_factory=set)  # locals that are only divided by, or compared
     signs: dict[Node, bool] = field(default_factory=dict)  # whether a value is known not to be negative
     inverses: dict[str, tuple[Raw, Node | None]] = field(default_factory=dict)  # 1/x, 0 unless the condition holds
-    tally: Tally = field(default_factory=Tally)
     risks: Counter[str] = field(default_factory=Counter)
 
 

@@ -86,11 +86,9 @@ class Sums(Products):
         if self.small(ra) and self.small(rb) and s >= FIRST:
             for begin in (total, self.fit(total)):
                 if begin.low + low >= -LIMIT and begin.high + high <= LIMIT:
-                    self.c.tally.proved += 1
                     args = (begin.node, ra.node, rb.node)
                     clipped = make("q_mac", args, (s,)) if self.small(begin) else None
                     return Raw(make("q_fma", args, (s,)), e, begin.low + low, begin.high + high, clipped)
-            self.c.tally.guarded += 1
             node = make("q_mac", (self.fit(total).node, ra.node, rb.node), (s,))
             return Raw(node, e, max(total.low + low, -INSIDE), min(total.high + high, INSIDE))
         return self._plus(total, 1, self._mul(ra, rb, s, e, most), e)

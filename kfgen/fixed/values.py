@@ -55,9 +55,7 @@ class Values:
             low, high = (floor(v / power(s) + Fraction(1, 2)) for v in (a.low, a.high))
             return Raw(make("q_shift", (a.node,), (min(s, 62),)), e, low, high)
         if a.size << -s <= LIMIT:
-            self.c.tally.proved += 1
             return Raw(make("mul", (a.node, constant(1 << -s))), e, a.low << -s, a.high << -s)
-        self.c.tally.guarded += 1
         return Raw(make("q_shift", (a.node,), (max(s, -62),)), e)
 
     def outside(self, path: str) -> bool:
@@ -91,7 +89,6 @@ class Values:
         if a.node.op == "neg":
             return replace(a, node=a.node.args[0], low=-a.high, high=-a.low)
         if a.low < -LIMIT:
-            self.c.tally.guarded += 1
             return Raw(make("q_sub", (constant(0), a.node)), a.e)
         return Raw(make("neg", (a.node,)), a.e, -a.high, -a.low)
 
@@ -102,7 +99,6 @@ class Values:
         """Clipped to what is allowed inside."""
         if self.small(a):
             return a
-        self.c.tally.guarded += 1
         if a.clipped is not None:
             return Raw(a.clipped, a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
         return Raw(make("q_fit", (a.node,)), a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
