@@ -34,6 +34,8 @@ that is right lies in its chi-square band; the tests hold those that promise it 
   that it was the other one's turn, and `mu`, the probability of each mode. Consistent where the modes cover what
   happens. Modes should differ; more than three seldom help. A state that a mode does not use should fade in it
   (`a: 0.5*a`), so that it is not stale when the mode that needs it takes over.
+  Give `robust` and `adaptive` to all modes or to none: mu is weighed by the updates as they are made, so a mode that
+  clips its innovations looks likely whatever it is told. A gate refuses only what all modes would refuse.
 
 `adaptive` is for a target that moves as the model does not say, or a start that is wrong: an innovation that is too
 large is then true, and P has to grow until it is believed. An outlier looks the same and is believed too: x jumps to
