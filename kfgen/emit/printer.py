@@ -197,7 +197,7 @@ class Printer:
             case Section(text=text):
                 return comment(text, depth)
             case Let(node=node, name=name):
-                kind = {"real": real, "bool": "bool", "int": "int"}[node.kind]
+                kind = {"real": real, "bool": "bool", "int": "int", "long": "int64_t"}[node.kind]
                 return _wrapped(f"const {kind} {name} = {e(node)};", depth)
             case Declare(name=name, size=size, value=value, kind=kind):
                 c_kind = real if kind == "real" else kind
@@ -272,16 +272,22 @@ def _wrapped(text: str, depth: int) -> list[str]:
 
 
 def _break(text: str, start: int) -> int | None:
-    """Where to break a line: at the space of least parenthesis depth in the last two thirds, the last of those."""
+    """Where to break a line: at the space of least parenthesis depth in the last two thirds, the last of those.
+
+    Where there is none, at the last one before, or else behind a parenthesis.
+    """
     best: tuple[int, int] | None = None
+    early: int | None = None
+    opened: int | None = None
     level = 0
     in_product = 0
     for i, c in enumerate(text[: WIDTH + 1]):
         if c in "([":
             level += 1
+            opened = i + 1 if c == "(" and start < i < WIDTH - 1 else opened
         elif c in ")]":
             level -= 1
-        elif c == " " and i > start + (WIDTH - start) // 3:
+        elif c == " " and i > start:
             following = text[i + 1 : i + 2]
             if following in "+-?:|&" or text[i - 1] in ",=":
                 in_product = 0
@@ -289,7 +295,10 @@ def _break(text: str, start: int) -> int | None:
                 in_product = 1
             else:
                 continue
+            if i <= start + (WIDTH - start) // 3:
+                early = i
+                continue
             score = -(2 * level + in_product)
             if best is None or score >= best[0]:
                 best = (score, i)
-    return None if best is None else best[1]
+    return best[1] if best is not None else opened if early is None else early

@@ -11,6 +11,8 @@ from math import isqrt
 
 LIMIT = 2**31 - 1
 """Results lie within -LIMIT and LIMIT, so that each has a negative; arguments may be -LIMIT - 1 too."""
+LONGEST = 2**48
+"""What a term of a sum of 64 bits is cut off at."""
 SATURATED = 0x20
 """The bit of a status that says so."""
 NEAREST, FLOOR = "nearest", "floor"
@@ -66,6 +68,28 @@ def madd(c: int, a: int, b: int, s: int, rounding: str = NEAREST) -> int:
 def shift(a: int, s: int, status: Status, rounding: str = NEAREST) -> int:
     """a / 2^s, -62 <= s <= 62."""
     return clamp(scale(a, s, rounding), status)
+
+
+def gather(w: int, a: int, b: int, s: int) -> int:
+    """w + a b / 2^s of an int64_t w, 0 <= s <= 62; the product, rounded to nearest, is cut off at 2^48."""
+    return w + max(-LONGEST, min(LONGEST, scale(a * b, s)))
+
+
+def stretch(w: int, b: int, s: int) -> int:
+    """w b / 2^s of an int64_t w, cut off at 2^47, 17 <= s <= 62; the result is cut off at 2^48."""
+    w = max(-LONGEST // 2, min(LONGEST // 2, w))
+    product = (w >> 16) * b + scale((w & 0xFFFF) * b, 16)
+    return max(-LONGEST, min(LONGEST, scale(product, s - 16)))
+
+
+def word(w: int, s: int, status: Status) -> int:
+    """w / 2^s of an int64_t w, to nearest whatever the rounding is."""
+    return clamp(scale(w, s), status)
+
+
+def rest(w: int, s: int) -> int:
+    """What is left of w beside its word, in -2^(s - 1) ... 2^(s - 1) - 1."""
+    return w - (scale(w, s) << s)
 
 
 def div(a: int, b: int, s: int, status: Status) -> int:

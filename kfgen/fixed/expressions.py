@@ -40,23 +40,26 @@ class Expressions(Functions):
 
     def compare(self, node: Node) -> Node:
         """a < b or a <= b, the coarser shifted left where it has room."""
-        strict = node.op == "lt"
         left, right = node.args
         if right.constant is not None:
-            a = self.value(left)
-            limit = right.constant / power(a.e)
-            return self._bounded(a, ceil(limit) - 1 if strict else floor(limit))
+            return self.beside(node, self.value(left), False)
         if left.constant is not None:
-            b = self.value(right)
-            limit = left.constant / power(b.e)
-            inner = self._bounded(b, floor(limit) if strict else ceil(limit) - 1)
-            return boolean(not inner.constant) if inner.constant is not None else self._above(b, limit, strict)
+            return self.beside(node, self.value(right), True)
         a, b = self.value(left), self.value(right)
         e = min(a.e, b.e)
         coarse = a if a.e > e else b
         if coarse.e > e and coarse.size * 2 ** (coarse.e - e) > LIMIT:
             e = coarse.e
         return make(node.op, (self.at(a, e).node, self.at(b, e).node), None, "bool")
+
+    def beside(self, node: Node, a: Raw, above: bool) -> Node:
+        """The comparison of a value with a constant, which is on the left where the value is to be above it."""
+        strict = node.op == "lt"
+        limit = (node.args[0 if above else 1].constant or 0) / power(a.e)
+        if not above:
+            return self._bounded(a, ceil(limit) - 1 if strict else floor(limit))
+        inner = self._bounded(a, floor(limit) if strict else ceil(limit) - 1)
+        return boolean(not inner.constant) if inner.constant is not None else self._above(a, limit, strict)
 
     def _bounded(self, a: Raw, most: int) -> Node:
         """a <= most."""

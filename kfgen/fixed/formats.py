@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.cells import Arrays, Cell
+from kfgen.fixed.chains import chained
+from kfgen.fixed.pace import Pace
 from kfgen.fixed.real import Ranges
 from kfgen.ir.nodes import Node
 
@@ -22,6 +24,7 @@ PASSING = 1  # the same for what is not kept
 MORE = 2  # further ones where gains depend on the data, so that no run shows their largest values
 SPARE = 3  # bits above a declared range, which a filter may overshoot
 KEPT = 5  # bits of the process noise of a step
+CARRIED = 16  # bits below the LSB that a carried cell has
 SLACK = 1.02  # of a run's figures, so that the last digit of a platform's libm decides nothing
 
 
@@ -43,11 +46,12 @@ class Quantity:
     largest: float
     e: int
     raised: str = ""
+    bits: int = OUTSIDE
 
     @property
     def headroom(self) -> int:
         """Bits between the largest value and the format's end."""
-        return self.e + OUTSIDE - above(self.largest)
+        return self.e + self.bits - above(self.largest)
 
 
 @dataclass
@@ -60,6 +64,7 @@ class Formats:
     more: int = 0  # further head-room
     fixed: dict[Cell, int] = field(default_factory=dict)
     report: list[Quantity] = field(default_factory=list)
+    carried: dict[Cell, int] = field(default_factory=dict)  # cells with digits below their LSB -> place in kf.rest
 
     def of(self, cell: Cell) -> int | None:
         """The exponent of a cell; None where the runs have told nothing."""
@@ -84,15 +89,49 @@ class Formats:
 
 
 def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, scale: Mapping[str, int] | None,
-           linear: bool, noise: list[list[float]]) -> Formats:  # fmt: skip
+           linear: bool, noise: list[list[float]], pace: Pace) -> Formats:  # fmt: skip
     """The formats of the interface and of the covariance.
 
     scale: exponents of the states' units, where given. linear: the covariance does not depend on the data.
-    noise: what a step adds to each variance (modes, n).
+    noise: what a step adds to each variance (modes, n). pace: what the steps of a run changed.
     """
     formats = Formats(arrays, ranges, bits, 0 if linear else MORE)
     _Interface(code, formats, scale or {}, noise).choose()
+    _carry(code, formats, pace)
     return formats
+
+
+def _carry(code: FilterCode, formats: Formats, pace: Pace) -> None:
+    """Find the cells of one filter that change by less than can be rounded away."""
+    arrays, states = formats.arrays, code.model.states
+
+    def carry(cell: Cell, name: str) -> None:
+        if chained(code.functions, arrays, cell):
+            formats.carried[cell] = len(formats.carried)
+            for q in formats.report:
+                if q.name == name:
+                    q.raised = f"{q.raised}, rounding carried on".removeprefix(", ")
+
+    for i in range(len(states)):
+        cell = arrays.element(("array", "kf.x"), i)
+        if pace.drifts(i, math.ldexp(1.0, formats.fixed[cell])):
+            carry(cell, states[i])
+    if not pace.moved:
+        return
+    variances, others = ("D", "U") if "kf.D" in pace.moved else ("P", "P")
+    slow: set[int] = set()
+    for diagonal in (True, False):  # beside a slow variance, correlations may be slow as well
+        for j in range(len(states)):
+            for i in (j,) if diagonal else range(j):
+                name = f"kf.{variances if diagonal else others}"
+                index = j if name == "kf.D" else j * (j - 1) // 2 + i if name == "kf.U" else j * (j + 1) // 2 + i
+                cell = arrays.element(("array", name), index)
+                e = formats.of(cell)
+                if e is None or not (diagonal or {i, j} & slow):
+                    continue
+                if pace.crawls(name, index, code.order[j] if diagonal else None, math.ldexp(1.0, e)):
+                    slow |= {j} if diagonal else set()
+                    carry(cell, f"{variances}[{states[code.order[j]]}]" if diagonal else "")
 
 
 class _Interface:
@@ -221,6 +260,10 @@ class _Interface:
             if "S" not in fields and e is not None and noise > 0:
                 wanted = math.frexp(noise)[1] - 1 - KEPT
                 f.fixed[cell] = max(min(e, wanted), exponent(1.05 * largest, 0))
+            if e is not None and "S" not in fields:
+                name = f"{place}{'D' if 'D' in fields else 'P'}[{self.model.states[state]}]"
+                gave = "head-room given to the process noise" if f.fixed[cell] < e else ""
+                f.report.append(Quantity(name.removeprefix("modes."), largest, f.fixed[cell], gave, BITS))
         if "P" not in fields:
             return
         diagonal = []

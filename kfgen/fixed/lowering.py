@@ -7,12 +7,13 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import cast
 
-from kfgen.filters.base import FilterCode
+from kfgen.filters.base import Block, FilterCode
+from kfgen.fixed.carry import Carry
 from kfgen.fixed.cells import Cell, affine, array_of, number_of, plain
 from kfgen.fixed.expressions import Expressions
 from kfgen.fixed.formats import Formats
 from kfgen.fixed.plan import Plan, variables
-from kfgen.fixed.raw import DYNAMIC, LIMIT, Context, QTable, constant, is_variance, nearest
+from kfgen.fixed.raw import DYNAMIC, LIMIT, Context, QTable, Raw, constant, is_variance, nearest
 from kfgen.fixed.unroll import make
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
@@ -33,6 +34,7 @@ from kfgen.ir.program import (
     walk,
 )  # fmt: skip
 
+REST = "what x and the variances have below their LSB, by 2^-16 of it"
 STATUS = Argument("flags", "{name}_status_t", pointer=True, constant=False)
 
 
@@ -51,6 +53,9 @@ def lower(code: FilterCode, formats: Formats) -> FilterCode:
             for i, value in enumerate(block.initial)
         )
         blocks.append(replace(block, initial=initial))
+    if formats.carried:
+        size = len(formats.carried)
+        blocks.append(Block("rest", size, REST, initial=(Fraction(0),) * size))
     return replace(
         code, blocks=tuple(blocks), functions=tuple(done.values()),
         tables=cast(Mapping[Table, str], {tables[t]: name for t, name in code.tables.items() if t in tables}),
@@ -67,12 +72,14 @@ class _Statements:
         self.c = context
         self.f = context.function
         self.x = Expressions(context)
+        self.carry = Carry(context, self.x)
         self.done = done
         self.ties: dict[str, Cell] = {}
 
     def function(self) -> Function:
         self._ties()
         Plan(self.c, self.x, self.ties, self.exponent, self.target).run(self.f.body)
+        self.carry.find(self.f)
         body = _tidied(alive(self.block(self.f.body)))
         arguments = self.f.arguments
         if self.f.private:
@@ -107,7 +114,7 @@ class _Statements:
             case Section():
                 return [s]
             case Let():
-                return self.let(s)
+                return [*self.let(s), *self.carry.local(s)]
             case Declare(name=name, value=value):
                 if value is None:
                     return [s]
@@ -115,8 +122,11 @@ class _Statements:
                     return [replace(s, value=self.x.index(value))]
                 e = self.exponent(("variable", self.f.name, name))
                 return [replace(s, value=self.x.value(value, e).node)]
-            case Assign() | Store():
+            case Assign():
                 return [self.store(s)]
+            case Store():
+                cell = self.carry.cell_of(s)
+                return [self.store(s)] if cell is None else self.carried(s, cell)
             case Guard(condition=condition, before=before):
                 test = self.x.index(condition)
                 if test.constant == 0:
@@ -217,6 +227,22 @@ class _Statements:
         if isinstance(s, Store) and raw.low < 0 and s.index is not None and is_variance(s.name, s.index):
             node = make("q_max", (node, constant(0)))
         return replace(s, index=index, node=node)
+
+    def carried(self, s: Store, cell: Cell) -> list[Statement]:
+        """A store with its rest."""
+        stored = self.store(s)
+        assert isinstance(stored, Store)
+        upper = self.carry.upper(s, cell)
+        if upper is None:
+            return [stored, self.carry.cleared(cell)]
+        lets, node, rest = upper
+        raw = Raw(node, self.exponent(cell))
+        if not self._is_outside(cell):
+            raw = self.x.fit(raw)
+        node = raw.node
+        if s.index is not None and is_variance(s.name, s.index):
+            node = make("q_max", (node, constant(0)))
+        return [*lets, replace(stored, node=node), rest]
 
     def call(self, s: Call) -> Call:
         args: list[str | Slice | Node] = []

@@ -84,12 +84,13 @@ def probe(real: RealProgram, code: FilterCode, integer: FilterCode, formats: For
           rows: int) -> Departure:  # fmt: skip
     """Run both over a log, each from its own init."""
     program = IntegerProgram(list(integer.functions), formats.arrays, scalar)
-    found = _Probe(real, program, code, formats).run(log, rows)
+    found = _Probe(real, program, code, formats, integer).run(log, rows)
     return replace(found, peaks=program.peaks)
 
 
 class _Probe:
-    def __init__(self, real: RealProgram, integer: IntegerProgram, code: FilterCode, formats: Formats) -> None:
+    def __init__(self, real: RealProgram, integer: IntegerProgram, code: FilterCode, formats: Formats,
+                 lowered: FilterCode) -> None:  # fmt: skip
         self.real = real
         self.integer = integer
         self.code = code
@@ -97,7 +98,7 @@ class _Probe:
         self.spec = code.model.spec
         self.formats = formats
         self.a = blank(code)
-        self.b = _integers(blank(code))
+        self.b = _integers(blank(lowered))
         self.refused = 0
 
     def raw(self, cell: Cell, value: float) -> int:

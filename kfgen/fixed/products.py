@@ -139,6 +139,8 @@ class Products(Values):
             return raw if sign > 0 else self.negative(raw)
         if raw.node.constant == 0:
             return total
+        if total.node.constant == 0:
+            return raw if sign > 0 else self.negative(raw)
         if raw.node.constant is not None and raw.node.constant < 0:
             raw, sign = self.negative(raw), -sign
         low = total.low + (raw.low if sign > 0 else -raw.high)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.real import Memory, Ranges, RealProgram
 
 Columns = Mapping[str, Sequence[float]]
+Watcher = Callable[[int, int, Memory, Callable[[], object]], None]  # makes row k's step of `rows`, and looks at it
 CORRELATED = 75  # rows between two covariances that are given
 OUTAGE = 60  # rows without any reading
 EVERY = 16  # rows between two calls of the functions that a run does not need
@@ -48,22 +49,28 @@ class Runner:
         self.statuses[status] = self.statuses.get(status, 0) + 1
         return status
 
-    def run(self, log: Columns, rows: int, correlation: float = 0.0, every: int = 1) -> Memory:
+    def run(self, log: Columns, rows: int, correlation: float = 0.0, every: int = 1,
+            watch: Watcher | None = None, start: tuple[Memory, int] | None = None) -> Memory:  # fmt: skip
         """A whole log, as `kfgen run` would: predict, then the updates in the spec's order.
 
         correlation: the states are given this one now and then, so that no part of a covariance is taken for zero
         only because the first one is diagonal. every: rows from one reading of a sensor to the next; beyond 1 there
-        is a gap of OUTAGE rows as well.
+        is a gap of OUTAGE rows as well. watch: makes the steps, and sees them. start: where another run has ended, and
+        the row to go on with.
         """
-        memory = blank(self.code)
-        self.call("init", memory)
+        memory, first = (blank(self.code), 0) if start is None else start
+        if start is None:
+            self.call("init", memory)
         self._look(memory)
-        for k in range(rows):
+        for k in range(first, rows):
             if correlation and k % CORRELATED == 0:
                 self._correlate(memory, correlation)
             self._inputs(memory, log, k)
             if self._step(memory, log, k):
-                self.call("predict", memory)
+                if watch is None:
+                    self.call("predict", memory)
+                else:
+                    watch(k - first, rows - first, memory, lambda: self.call("predict", memory))
                 self._look(memory)
             for place, sensor in enumerate(self.spec.measurements):
                 if every == 1 or ((k + place) % every == 0 and not rows < 2 * k < rows + 2 * OUTAGE):
@@ -86,6 +93,14 @@ class Runner:
         ]  # fmt: skip
         self.call("set_covariance", memory)
         self._look(memory)
+
+    def rescale(self, memory: Memory, factors: Sequence[float]) -> None:
+        """Multiply the standard deviations of the states, at the same correlations."""
+        n = len(factors)
+        self.call("get_covariance", memory)
+        P = memory.arrays["P"]
+        memory.arrays["P"] = [factors[i] * factors[j] * P[i * n + j] for i in range(n) for j in range(n)]
+        self.call("set_covariance", memory)
 
     def _inputs(self, memory: Memory, log: Columns, k: int) -> None:
         for each in self.spec.inputs:

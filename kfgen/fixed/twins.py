@@ -15,6 +15,10 @@ TWINS: dict[str, Callable[..., int]] = {
     "add": basic.add,
     "sub": basic.sub,
     "shift": basic.shift,
+    "gather": basic.gather,
+    "stretch": basic.stretch,
+    "word": basic.word,
+    "rest": basic.rest,
     "div": basic.div,
     "reciprocal": basic.reciprocal,
     "sqrt": basic.sqrt,
@@ -36,4 +40,4 @@ TWINS: dict[str, Callable[..., int]] = {
     "pow": exponential.pow,
 }
 """name -> function; the arguments are those of the C routine, `status` last where it has one."""
-WITHOUT_STATUS = frozenset({"madd", "floor", "atan2"})
+WITHOUT_STATUS = frozenset({"gather", "stretch", "rest", "madd", "floor", "atan2"})

@@ -20,17 +20,21 @@ from kfgen.fixed.arithmetic import Status
 from kfgen.fixed.routines import NEEDS, closure
 from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
 
-# routine -> its arguments: w an int64_t, h a positive one, i a raw int32_t, m one below 2^30; other letters are ints
-# of a range of their own
+# routine -> its arguments: w an int64_t, h a positive one, l one of 52 bits, i a raw int32_t, m one below 2^30; other
+# letters are ints of a range of their own
 ARGUMENTS = {
+    "gather": "liis", "stretch": "wiu", "word": "ws", "rest": "lc",
     "narrow": "ws", "mul": "iis", "madd": "imms", "add": "ii", "sub": "ii", "shift": "it", "div": "iit",
     "reciprocal": "is", "sqrt": "it", "floor": "if", "wrap": "ih", "hypot": "ii", "sin": "iff", "cos": "iff",
     "atan": "iff", "atan2": "iir", "exp": "iff", "log": "iff", "tan": "ifg",
     "asin": "ifg", "acos": "ifg", "sinh": "ifg", "cosh": "ifg", "tanh": "ifg", "pow": "ififg",
 }  # fmt: skip
-C_TYPES = {"w": "int64_t", "h": "int64_t", "i": "int32_t", "m": "int32_t"}
-NUMPY_TYPES = {"w": np.int64, "h": np.int64, "i": np.int32, "m": np.int32}
-RANGES = {"m": (1 - 2**30, 2**30 - 1), "s": (0, 62), "t": (-62, 62), "f": (0, 31), "g": (0, 30), "r": (0, 29)}
+C_TYPES = {"w": "int64_t", "h": "int64_t", "l": "int64_t", "i": "int32_t", "m": "int32_t"}
+NUMPY_TYPES = {"w": np.int64, "h": np.int64, "l": np.int64, "i": np.int32, "m": np.int32}
+RANGES = {
+    "l": (-(2**52), 2**52), "m": (1 - 2**30, 2**30 - 1), "s": (0, 62), "t": (-62, 62), "f": (0, 31), "g": (0, 30),
+    "r": (0, 29), "u": (17, 62), "c": (1, 31),
+}  # fmt: skip
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 HEAD = "#include <stdbool.h>\n#include <stdint.h>\n#define SATURATED UINT32_C(0x20)\n"
 
@@ -47,8 +51,8 @@ def callers() -> str:
         names = [f"{letter}{i}" for i, letter in enumerate(letters)]
         taken = ", ".join(f"const {C_TYPES.get(name[0], 'int')} *{name}" for name in names)
         given = ", ".join(f"{name}[i]" for name in names)
-        out += [f"void call_{op}(int n, {taken}, int32_t *result, uint32_t *status);"]
-        out += [f"void call_{op}(int n, {taken}, int32_t *result, uint32_t *status)", "{"]
+        out += [f"void call_{op}(int n, {taken}, int64_t *result, uint32_t *status);"]
+        out += [f"void call_{op}(int n, {taken}, int64_t *result, uint32_t *status)", "{"]
         out += ["    for (int i = 0; i < n; i++) {", "        status[i] = 1;"]
         given += "" if op in WITHOUT_STATUS else ", &status[i]"
         out += [f"        result[i] = t_q_{op}({given});", "    }", "}"]
@@ -69,10 +73,10 @@ class Routines:
         letters = ARGUMENTS[op]
         types = [NUMPY_TYPES.get(letter, np.intc) for letter in letters]
         arrays: list[Any] = [np.array(c, dtype=t) for c, t in zip(columns, types, strict=True)]
-        result, status = np.zeros(n, np.int32), np.zeros(n, np.uint32)
+        result, status = np.zeros(n, np.int64), np.zeros(n, np.uint32)
         names = [C_TYPES.get(letter, "int") for letter in letters]
         pointers = [self.ffi.from_buffer(f"{t}[]", a) for t, a in zip(names, arrays, strict=True)]
-        outputs = [self.ffi.from_buffer("int32_t[]", result), self.ffi.from_buffer("uint32_t[]", status)]
+        outputs = [self.ffi.from_buffer("int64_t[]", result), self.ffi.from_buffer("uint32_t[]", status)]
         getattr(self.library, f"call_{op}")(n, *pointers, *outputs)
         return result.tolist(), status.tolist()
 

@@ -20,6 +20,8 @@ def number(source: random.Random, letter: str) -> int:
     """Of the kind that ARGUMENTS names; sizes of all orders, extremes and neighbours of powers of two often."""
     if letter == "m":
         return max(1 - 2**30, number(source, "i") >> 1)
+    if letter == "l":
+        return number(source, "w") >> 11
     if letter in RANGES:
         return source.randint(*RANGES[letter])
     if letter == "h":
