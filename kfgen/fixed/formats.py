@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.cells import Arrays, Cell
+from kfgen.fixed.cells import Arrays, Cell, plain
 from kfgen.fixed.chains import chained
 from kfgen.fixed.pace import Pace
 from kfgen.fixed.real import Ranges
@@ -20,6 +20,7 @@ from kfgen.ir.nodes import Node
 BITS = 30  # of the size of a number inside: sums of two then fit an int32_t
 OUTSIDE = 31  # of one that the user reads or writes
 HEADROOM = 2  # bits above the largest value of the runs
+COVARIANCE = 2  # the same for P, which an outage in the runs has driven further than most will
 PASSING = 1  # the same for what is not kept
 MORE = 2  # further ones where gains depend on the data, so that no run shows their largest values
 SPARE = 3  # bits above a declared range, which a filter may overshoot
@@ -73,7 +74,8 @@ class Formats:
             largest = self.ranges.largest(cell)
             if largest == 0:
                 return None
-            found = self.fixed[cell] = exponent(largest, HEADROOM + self.more)
+            covariance = cell[0] == "array" and plain(str(cell[1])) in ("kf.D", "kf.P")
+            found = self.fixed[cell] = exponent(largest, COVARIANCE if covariance else HEADROOM + self.more)
         return found
 
     def node(self, node: Node, headroom: int = PASSING) -> int | None:

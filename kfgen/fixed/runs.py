@@ -12,7 +12,8 @@ from kfgen.fixed.real import Memory, Ranges, RealProgram
 Columns = Mapping[str, Sequence[float]]
 Watcher = Callable[[int, int, Memory, Callable[[], object]], None]  # makes row k's step of `rows`, and looks at it
 CORRELATED = 75  # rows between two covariances that are given
-OUTAGE = 60  # rows without any reading
+OUTAGE = 60  # rows without any reading, or fewer where a variance grows
+GROWN = 2.0**14  # times in them: more than that says no more than that a state is unknown
 EVERY = 16  # rows between two calls of the functions that a run does not need
 
 
@@ -62,6 +63,7 @@ class Runner:
         if start is None:
             self.call("init", memory)
         self._look(memory)
+        least: list[float] = []  # variances of the rows before the outage
         for k in range(first, rows):
             if correlation and k % CORRELATED == 0:
                 self._correlate(memory, correlation)
@@ -72,9 +74,14 @@ class Runner:
                 else:
                     watch(k - first, rows - first, memory, lambda: self.call("predict", memory))
                 self._look(memory)
+            if every > 1 and rows < 2 * k < rows + 2 * OUTAGE and not self._grown(memory, least):
+                continue
             for place, sensor in enumerate(self.spec.measurements):
-                if every == 1 or ((k + place) % every == 0 and not rows < 2 * k < rows + 2 * OUTAGE):
+                if (k + place) % every == 0:
                     self._update(memory, sensor, log, k)
+            if every > 1 and rows - 2 * OUTAGE < 2 * k <= rows:
+                found = self._variances(memory)
+                least = [min(pair) for pair in zip(least or found, found, strict=True)]
             if k % EVERY == 0 or k == rows - 1:
                 self._others(memory, k)
         return memory
@@ -93,6 +100,18 @@ class Runner:
         ]  # fmt: skip
         self.call("set_covariance", memory)
         self._look(memory)
+
+    def _grown(self, memory: Memory, least: list[float]) -> bool:
+        """Whether a variance has become so large in an outage that the state is as good as unknown."""
+        found = self._variances(memory)
+        return any(0 < old * GROWN < new for old, new in zip(least, found, strict=bool(least)))
+
+    def _variances(self, memory: Memory) -> list[float]:
+        other = memory.copy()
+        if "get_covariance" in self.names:
+            self.program.run("get_covariance", other)
+        n = len(self.code.model.states)
+        return other.arrays.get("P", [0.0] * (n * n))[: n * n : n + 1]
 
     def rescale(self, memory: Memory, factors: Sequence[float]) -> None:
         """Multiply the standard deviations of the states, at the same correlations."""
