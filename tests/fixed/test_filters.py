@@ -14,6 +14,7 @@ from kfgen.ir import interpret
 from kfgen.override import override
 from kfgen.spec.loading import loads
 from kfgen.status import Status
+from tests.oracle.problems import NOISE_INPUTS
 
 BALL = """
 kfgen: 1
@@ -134,6 +135,11 @@ def test_ball(covariance, update):
 @pytest.mark.parametrize(("covariance", "update"), FORMS[::2])
 def test_constant_velocity(covariance, update):
     assert follow("specs/cv4.yaml", covariance=covariance, update=update) < 0.02
+
+
+def test_correlated_readings_and_conditions_that_are_known():
+    """A guard that cannot fail leaves a factor of 1, and the digits of the other one are all there."""
+    assert follow(NOISE_INPUTS, steps=30) < 0.01
 
 
 def test_metres_beside_radians_need_no_hint():
