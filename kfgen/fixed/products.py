@@ -16,7 +16,7 @@ class Products(Values):
     """Lowers products and quotients."""
 
     def product(self, node: Node, e: int | None) -> Raw:
-        a, b = node.args
+        a, b = map(self.folded, node.args)
         if b.constant is not None:
             a, b = b, a
         if a.constant is not None and not self._inverse_of(b):
@@ -42,6 +42,7 @@ class Products(Values):
         return raws[0].e if len(raws) == 1 else raws[0].e + raws[1].e + BITS
 
     def _product(self, a: Node, b: Node, e: int) -> Raw:
+        a, b = self.folded(a), self.folded(b)
         if self._inverse_of(a):
             a, b = b, a
         inverse = self._inverse_of(b)
@@ -166,7 +167,7 @@ class Products(Values):
             case "neg":
                 return self.digits(node.args[0])
             case "mul":
-                a, b = node.args
+                a, b = map(self.folded, node.args)
                 if b.constant is not None:
                     a, b = b, a
                 if self._inverse_of(a) or self._inverse_of(b):
@@ -187,7 +188,7 @@ class Products(Values):
 
     def roomier(self, node: Node, e: int | None) -> int | None:
         """An exponent a little coarser at which a product is proved to fit, if there is one."""
-        a, b = node.args
+        a, b = map(self.folded, node.args)
         natural = self.natural(node)
         if natural is None or self._inverse_of(a) or self._inverse_of(b):
             return e

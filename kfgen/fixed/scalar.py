@@ -102,6 +102,6 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "q_min": lambda d, a, b: min(a, b),
     "q_max": lambda d, a, b: max(a, b),
     "q_sign": lambda d, a: (a > 0) - (a < 0),
-    "q_abs": lambda d, a: abs(a),
+    "q_abs": lambda d, a: min(abs(a), 2**31 - 1),
     "q_count": lambda d, a: min(a, 2**31 - 1),
 }

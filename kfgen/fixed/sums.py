@@ -61,7 +61,7 @@ class Sums(Products):
         """total + sign times a product, at e."""
         if len(factors) == 1:
             factors = factors[0].args
-        a, b = factors
+        a, b = map(self.folded, factors)
         if b.constant is not None:
             a, b = b, a
         if self._inverse_of(a) or self._inverse_of(b):

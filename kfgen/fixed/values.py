@@ -128,6 +128,13 @@ class Values:
         """With 0 to 30 fraction bits, as functions take their arguments."""
         return self.at(a, min(max(a.e, -30), 0))
 
+    def folded(self, node: Node) -> Node:
+        """A local that turned out to be a constant, as that constant."""
+        raw = self.c.locals.get(node.data) if node.op == "variable" else None
+        if raw is None or raw.node.constant is None:
+            return node
+        return make("const", (), raw.node.constant * power(raw.e))
+
     def definition(self, node: Node) -> Node:
         """What a local stands for."""
         while node.op == "variable" and node.data in self.c.nodes:

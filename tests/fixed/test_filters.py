@@ -14,6 +14,7 @@ from kfgen.ir import interpret
 from kfgen.override import override
 from kfgen.spec.loading import loads
 from kfgen.status import Status
+from tests.oracle.problems import NOISE_INPUTS
 
 BALL = """
 kfgen: 1
@@ -88,8 +89,8 @@ def raw_field(kf, name):
     return kf.raw[name]
 
 
-def follow(text, scalar="q16.16", steps=120, **chosen):
-    """Run C, interpreter and reference side by side; the largest error in sigma."""
+def follow(text, scalar="q16.16", steps=120, driven=(), **chosen):
+    """Run C, interpreter and reference side by side; the largest error in sigma. driven: sensors that take inputs."""
     spec = override(loads(text) if "\n" in text else kfgen.load(text), scalar, filter=chosen)
     generated = build(spec)
     kf = native.load_filters([(spec, generated.files)])[0]
@@ -113,8 +114,9 @@ def follow(text, scalar="q16.16", steps=120, **chosen):
             raw = value.to_raw(np.array([log.columns[f"{sensor}.{c}"][k] for c in components]), units.z[sensor])
             twin.memory.numbers.update({f"z.{c}": int(r) for c, r in zip(components, raw, strict=True)})
             z = value.to_physical(raw, units.z[sensor])
-            assert kf.update(sensor, z) == twin.call(f"update_{sensor}")
-            ref.update(sensor, z)
+            inputs = {"u": u} if sensor in driven else {}
+            assert kf.update(sensor, z, **inputs) == twin.call(f"update_{sensor}")
+            ref.update(sensor, z, **inputs)
         for name, values in twin.fields().items():
             assert raw_field(kf, name).tolist() == values, (k, name)
         if spec.imm is not None:
@@ -134,6 +136,11 @@ def test_ball(covariance, update):
 @pytest.mark.parametrize(("covariance", "update"), FORMS[::2])
 def test_constant_velocity(covariance, update):
     assert follow("specs/cv4.yaml", covariance=covariance, update=update) < 0.02
+
+
+def test_correlated_readings_and_conditions_that_are_known():
+    """A guard that cannot fail leaves a factor of 1, and the digits of the other one are all there."""
+    assert follow(NOISE_INPUTS, steps=30, driven=("gnss",)) < 0.01
 
 
 def test_metres_beside_radians_need_no_hint():

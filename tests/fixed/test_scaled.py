@@ -47,7 +47,7 @@ def test_interpreter_and_c_agree(target, rounding, tmp_path):
     floor = rounding == "floor"
     routines = SimpleNamespace(own=("fit", "fma", "mac"), floor=floor)
     view = SimpleNamespace(name="t", NAME="T", routines=routines, helpers=())
-    basic = macro("helpers_q.j2", "routines", "t", closure(["product", "round", "sar32"], floor), tables, "T_SATURATED",
+    basic = macro("helpers_q.j2", "routines", "t", closure(["asr", "product", "round"], floor), tables, "T_SATURATED",
                   floor=floor)  # fmt: skip
     head = HEAD + "#define T_SATURATED SATURATED\ntypedef uint32_t t_status_t;\n"
     (tmp_path / "t.c").write_text(head + basic + macro("helpers_scaled.j2", "define", view) + CALLS)
