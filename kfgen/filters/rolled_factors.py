@@ -8,7 +8,7 @@ from fractions import Fraction
 from kfgen.filters import linalg
 from kfgen.filters.kernels import absorb
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.looped import Kernels, Space, fill, integer
+from kfgen.filters.looped import Given, Kernels, Space, fill, integer
 from kfgen.filters.noise import NEGATIVE, Additive, Factored
 from kfgen.filters.numbers import assume_nonnegative, is_one, is_positive, is_zero, require_nonnegative
 from kfgen.filters.runs import Put, put
@@ -19,14 +19,15 @@ from kfgen.ir.trace import Array, Trace, Value
 class Absorber:
     """U and D in the local arrays `factor` (strict upper triangle by columns) and `diagonal`, and what they absorb.
 
-    names: of the states in the inner order. prefix: the filter's name. tables: see Layout.
+    names: of the states in the inner order. table: the name of a table in the emitted file. tables: see Layout.
     """
 
-    def __init__(self, names: list[str], kernels: Kernels, prefix: str) -> None:
+    def __init__(self, names: list[str], kernels: Kernels, table: tuple[str, str]) -> None:
+        """table: the filter's name, and what follows it."""
         self.n = len(names)
         self.names = names
         self.kernels = kernels
-        self.prefix = prefix
+        self.table = table
         self.tables: dict[str, tuple[int, ...]] = {}
 
     def arrays(self, space: Space) -> tuple[Array, Array]:
@@ -40,7 +41,7 @@ class Absorber:
 
         column_of(k, entry): gives the entries 0 to k of c_k, those after are zero. c_0 is the first unit vector.
         """
-        n, t = self.n, space.t
+        t = space.t
         t.section("Q")
         sure = self._start(t, space, Q)
         w = self.columns(space)
@@ -49,18 +50,37 @@ class Absorber:
         if noise:
             t.section("process noise")
         for c in range(0, len(noise), 2):
-            self._absorb_columns(space, sure, noise[c : c + 2])
+            self.absorb_columns(space, sure, noise[c : c + 2])
         t.section(title)
+        self._all_columns(space, sure, [row[0] for row in F], column_of, weight,
+                          lambda start: self._transition(t, F, w, start), lambda pair: self._reach(t, F, pair))
+
+    def add(
+        self, space: Space, column_of: Callable[[Value, Put], None], weight: Callable[[int | Value], Value]
+    ) -> None:
+        """+ sum of weight_k c_k c_k^T, columns as of `run`."""
+        n, t = self.n, space.t
+        self.columns(space)
+        unit: Vector = [t.one, *[t.zero] * (n - 1)]
+        self._all_columns(space, False, unit, column_of, weight, lambda start: None, lambda k: 2 * k + (2 + n % 2))
+
+    def _all_columns(
+        self, space: Space, sure: bool, first: Vector, column_of: Callable[[Value, Put], None],
+        weight: Callable[[int | Value], Value], change: Callable[[Value], None], reach: Callable[[Value], Value],
+    ) -> None:  # fmt: skip
+        """Columns in pairs. first: column 0 when changed. change: a column in w from a place on. reach: of a pair, how
+        many leading entries may differ from zero."""
+        n, t, w = self.n, space.t, self.columns(space)
         if n % 2:
-            self._absorb_columns(space, sure, [([row[0] for row in F], assume_nonnegative(weight(0)))])
+            self.absorb_columns(space, sure, [(first, assume_nonnegative(weight(0)))])
         with t.loop("pair", 0, n // 2) as pair:
             k = 2 * pair + n % 2
             with t.loop("side", 0, 2) as side:
                 start = side * n
                 column_of(k + side, lambda i, value: w.__setitem__(start + i, value))
-                self._transition(t, F, w, start)
+                change(start)
             weights = [assume_nonnegative(weight(place)) for place in (k, k + 1)]
-            self.absorb(space, sure, weights, self._reach(t, F, pair))
+            self.absorb(space, sure, weights, reach(pair))
 
     def columns(self, space: Space) -> Array:
         """Two columns to be absorbed, at zero; so they are afterwards."""
@@ -74,7 +94,9 @@ class Absorber:
     def absorb(self, space: Space, sure: bool, weights: list[Value], count: Value) -> None:
         """The two columns, of which `count` leading entries may differ from zero. sure: D is known to be positive."""
         U, D = self.arrays(space)
-        space.t.call(absorb(self.kernels, self.n, sure), [(U.name, 0), (D.name, 0), ("w", 0), *weights, count])
+        sure = sure and not self.kernels.several
+        arrays: list[Given] = [(each.name, 0) for each in (U, D, self.columns(space))]
+        space.t.call(absorb(self.kernels, self.n, sure), [*arrays, *weights, count])
 
     def learn(self, space: Space, field: str, rate: Fraction, sure: bool, steps: list[tuple[Array, Value]]) -> None:
         """See Rolled.learn; the field holds the factors as a Kept does."""
@@ -96,7 +118,7 @@ class Absorber:
                 t.store(field, column(j) + i, U[triangle(j) + i])
             t.store(field, column(j) + j, D[j])
 
-    def _absorb_columns(self, space: Space, sure: bool, columns: list[tuple[Vector, Value]]) -> None:
+    def absorb_columns(self, space: Space, sure: bool, columns: list[tuple[Vector, Value]]) -> None:
         """One or two columns (vector, weight), of which the entries are known one by one."""
         t, n = space.t, self.n
         none: tuple[Vector, Value] = ([t.zero] * n, t.zero)
@@ -139,5 +161,5 @@ class Absorber:
         counts = [1 + max(last[: j + 1]) for j in range(1 + n % 2, n, 2)]
         if counts == [n] * len(counts):
             return integer(t, n)
-        self.tables = {"reach": tuple(counts)}
-        return t.wrapped(t.pool.make("element", (pair.node,), f"{self.prefix}_reach", "int"))
+        self.tables = {self.table[1]: tuple(counts)}
+        return t.wrapped(t.pool.make("element", (pair.node,), "_".join(self.table), "int"))

@@ -66,7 +66,7 @@ class RolledFull(Full):
                 a[i * n + j] = value
         t.section("+ Q")
         self._add(t, a, additive, noise)
-        return Entries(space, "product", square=True)
+        return Entries(space, a.name, square=True)
 
     def _add(self, t: Trace, a: Array, Q: Rows, noise: list[tuple[Vector, Value]]) -> None:
         """Q and d w w^T, entry by entry where they are sparse, the upper triangle."""
@@ -221,7 +221,7 @@ class RolledFull(Full):
 
     def _not_negative(self, P: Entries, measurement: Measurement, gain: Column) -> Entries:
         """A variance that an exact measurement took to zero may come out below it by round-off: back to zero."""
-        c = P.terms[-1].c if self.form == "standard" else Array(P.space.t, "c0")
+        c = P.terms[-1].c if self.form == "standard" else P.space.arrays["c0"]
         P = self._written(P)
         t, array = P.space.t, Array(P.space.t, P.array)
         g = t.value(measurement.g)

@@ -16,7 +16,7 @@ from kfgen.filters.runs import Put
 from kfgen.filters.sqrt import Sqrt
 from kfgen.filters.symmetric import Symmetric
 from kfgen.filters.ud import packed, triangle
-from kfgen.ir.trace import Array, Trace, Value
+from kfgen.ir.trace import Trace, Value
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class RolledSqrt(Sqrt):
     rolled = True
 
     def __init__(
-        self, n: int, names: list[str], kernels: Kernels, weighted: bool, steps: bool, prefix: str
+        self, n: int, names: list[str], kernels: Kernels, weighted: bool, steps: bool, table: tuple[str, str]
     ) -> None:
         """As of RolledUD."""
         super().__init__(n)
@@ -42,7 +42,7 @@ class RolledSqrt(Sqrt):
         self.kernels = kernels
         self.weighted = weighted
         self.steps = steps
-        self.absorber = Absorber(names, kernels, prefix)
+        self.absorber = Absorber(names, kernels, table)
 
     @property
     def tables(self) -> Mapping[str, tuple[int, ...]]:  # type: ignore[override]
@@ -55,15 +55,16 @@ class RolledSqrt(Sqrt):
         """S_ij, i < j."""
         t = P.space.t
         if P.own:
-            return Array(t, "factor")[(triangle(j) if isinstance(j, Value) else packed(0, j)) + i]
-        return t.element("kf.S", self._spot(t, i, j))
+            return P.space.arrays["factor"][(triangle(j) if isinstance(j, Value) else packed(0, j)) + i]
+        return t.element("kf.S", self.spot(t, i, j))
 
     def _diagonal(self, P: Root, j: int | Value) -> Value:
         """S_jj."""
         t = P.space.t
-        return Array(t, "diagonal")[j] if P.own else t.element("kf.S", self._spot(t, j, j))
+        return P.space.arrays["diagonal"][j] if P.own else t.element("kf.S", self.spot(t, j, j))
 
-    def _spot(self, t: Trace, i: int | Value, j: int | Value) -> int | Value:
+    def spot(self, t: Trace, i: int | Value, j: int | Value) -> int | Value:
+        """Where S_ij stands in kf.S, i <= j."""
         if isinstance(i, int) and isinstance(j, int):
             return self.packed(i, j)
         return self._place(integer(t, i) if isinstance(i, int) else i, integer(t, j) if isinstance(j, int) else j)
@@ -83,7 +84,6 @@ class RolledSqrt(Sqrt):
     def predict(self, t: Trace, P: Root, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]  # type: ignore[override]
                 ) -> Root:  # fmt: skip
         """S S^T <- F S S^T F^T + Q + sum of d w w^T: U D U^T first, one root per state at the end."""
-        n = self.n
 
         def weight(k: int | Value) -> Value:
             if k == 0 and isinstance(k, int):  # its column is taken as a unit vector
@@ -96,14 +96,19 @@ class RolledSqrt(Sqrt):
                 entry(i, self._at(P, i, k))
 
         self.absorber.run(P.space, F, Q, noise, "F S S^T F^T + Q, two columns of F S after another", column_of, weight)
-        U, D = self.absorber.arrays(P.space)
         t.section("roots")
-        with t.loop("j", 0, n) as j:
-            root = t.name(sqrt(D[j]), "root")
+        self.take_roots(P.space)
+        return Root(P.space, own=True)
+
+    def take_roots(self, space: Space) -> None:
+        """From U D U^T in the arrays of the absorber to S S^T."""
+        t = space.t
+        U, D = self.absorber.arrays(space)
+        with t.loop("j", 0, self.n) as j:
+            root = t.name(sqrt(assume_nonnegative(D[j])), "root")
             D[j] = root
             with t.loop("i", 0, j) as i:
                 U[triangle(j) + i] = U[triangle(j) + i] * root
-        return Root(P.space, own=True)
 
     def update(self, t: Trace, P: Root, measurements: list[Measurement]  # type: ignore[override]
                ) -> tuple[Root, Rows, Vector]:  # fmt: skip
@@ -125,7 +130,7 @@ class RolledSqrt(Sqrt):
         t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *gain, (s.name, 0)])
         variance = t.name(s[0], "variance")
         if moves:
-            return P, [Displacement(space, n, Array(t, "moved"), [], s[1])], [variance]
+            return P, [Displacement(space, n, space.arrays["moved"], [], s[1])], [variance]
         return P, [Column(space, applied, n)], [variance]
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
@@ -153,7 +158,7 @@ class RolledSqrt(Sqrt):
         first, _ = space.row(h)
         if first == n:
             return 0
-        array = Array(t, "h")
+        array = space.arrays["h"]
         total = t.variable(t.unique("total"), 0)
         with t.loop("j", first, n) as j:
             f = t.variable("f", array[j] * self._diagonal(P, j))

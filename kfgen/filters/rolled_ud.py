@@ -17,7 +17,7 @@ from kfgen.filters.rolled_factors import Absorber
 from kfgen.filters.runs import Put
 from kfgen.filters.symmetric import Symmetric
 from kfgen.filters.ud import UD, packed, triangle
-from kfgen.ir.trace import Array, Trace, Value
+from kfgen.ir.trace import Trace, Value
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class Factors:
     own: bool
 
     def u(self, place: int | Value) -> Value:
-        return Array(self.space.t, "factor")[place] if self.own else self.space.t.element("kf.U", place)
+        return self.space.arrays["factor"][place] if self.own else self.space.t.element("kf.U", place)
 
     def d(self, place: int | Value) -> Value:
-        found = Array(self.space.t, "diagonal")[place] if self.own else self.space.t.element("kf.D", place)
+        found = self.space.arrays["diagonal"][place] if self.own else self.space.t.element("kf.D", place)
         assume_nonnegative(found)
         return found
 
@@ -44,17 +44,17 @@ class RolledUD(UD):
 
     def __init__(
         self, order: list[int], update: str, change: GainChange | None, names: list[str], kernels: Kernels,
-        weighted: bool, steps: bool, prefix: str,
+        weighted: bool, steps: bool, table: tuple[str, str],
     ) -> None:  # fmt: skip
         """names: of the states in the inner order. weighted: whether measurements may have a weight. steps:
-        whether what each measurement moves the state by is asked for. prefix: the filter's name."""
+        whether what each measurement moves the state by is asked for. table: as of Absorber."""
         super().__init__(order, update, change)
         self.group = 1
         self.names = names
         self.kernels = kernels
         self.weighted = weighted
         self.steps = steps
-        self.absorber = Absorber(names, kernels, prefix)
+        self.absorber = Absorber(names, kernels, table)
 
     @property
     def tables(self) -> Mapping[str, tuple[int, ...]]:  # type: ignore[override]
@@ -121,7 +121,7 @@ class RolledUD(UD):
         t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *gain, (s.name, 0)])
         variance = t.name(s[0], "variance")
         if moves:
-            return P, [Displacement(space, n, Array(t, "moved"), [], s[1])], [variance]
+            return P, [Displacement(space, n, space.arrays["moved"], [], s[1])], [variance]
         if self.change is not None:
             t.section("the gain that is applied differs from K by w: + s w w^T")
             w = self.absorber.columns(space)
@@ -156,7 +156,7 @@ class RolledUD(UD):
         first, _ = space.row(h)
         if first == n:
             return 0
-        array = Array(t, "h")
+        array = space.arrays["h"]
         total = t.variable(t.unique("total"), 0)
         with t.loop("j", first, n) as j:
             f = t.variable("f", array[j])
@@ -168,7 +168,7 @@ class RolledUD(UD):
 
     def inflated(self, P: Factors, a: Number) -> Factors:  # type: ignore[override]
         P = self._owned(P)
-        t, D = P.space.t, Array(P.space.t, "diagonal")
+        t, D = P.space.t, P.space.arrays["diagonal"]
         with t.loop("i", 0, self.n) as i:
             D[i] = D[i] * t.value(a)
         return P
@@ -177,7 +177,7 @@ class RolledUD(UD):
         self, t: Trace, P: Factors, floors: list[Fraction | None], ceilings: list[Fraction | None]
     ) -> Factors:
         P = self._owned(P)
-        array = Array(t, "diagonal")
+        array = P.space.arrays["diagonal"]
         D: Vector = [t.name(array[j], f"d_{name}") for j, name in enumerate(self.names)]
         limited = super().limit(t, ([], list(D)), floors, ceilings)[1]
         for j, (new, old) in enumerate(zip(limited, D, strict=True)):

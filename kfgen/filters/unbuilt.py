@@ -14,8 +14,6 @@ def unbuilt(spec: Spec) -> list[Mistake]:
         out.append(Mistake(place, f"{what} is not built yet", hint))
 
     code = spec.code
-    if spec.imm is not None and code.unroll == "none":
-        refuse(code.places.get("unroll", spec.place), "code.unroll: none with imm", "leave it out")
     if spec.scalar not in ("float", "double"):
         for key in ("flash", "ram", "stack"):
             if getattr(code, key) is not None:
