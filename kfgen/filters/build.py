@@ -30,7 +30,6 @@ from kfgen.filters.sqrt import Sqrt
 from kfgen.filters.steady import Steady
 from kfgen.filters.ud import UD
 from kfgen.filters.ukf import Ukf
-from kfgen.filters.unbuilt import unbuilt
 from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import roots, walk
 from kfgen.ir.trace import Trace
@@ -47,11 +46,8 @@ _FILTERS: dict[str, Callable[[Model, Layout, Scalar], Ekf]] = {
 def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
     """The filter of a spec. taken: names that locals must not have.
 
-    Raises SpecError for what is not built yet and for what only the model can tell.
+    Raises SpecError for what only the model can tell.
     """
-    missing = unbuilt(spec)
-    if missing:
-        raise SpecError(missing)
     taken |= {f"{spec.name}_{word}" for word in _private_words(spec, scalar)}
     emitted = _bank(spec, scalar, taken) if spec.imm is not None else _single(spec, scalar, taken)
     return _with_tables(with_privates(_unrolled_or_not(spec, scalar, emitted)))
@@ -64,8 +60,8 @@ Emitter = Callable[[str], FilterCode]
 def _unrolled_or_not(spec: Spec, scalar: Scalar, emitted: Emitter) -> FilterCode:
     """The filter in straight-line code or in loops, as `code` asks."""
     chosen = spec.code
-    if spec.filter.gain is not None:
-        return emitted("full")
+    if spec.filter.gain is not None or not scalar.uniform:
+        return emitted("auto")
     if chosen.flash is None:
         code = emitted(chosen.unroll)
         return told(code, {f.name for f in code.functions}) if chosen.unroll == "none" else code
@@ -230,7 +226,7 @@ def _order(models: tuple[Model, ...]) -> list[int]:
 
 def _private_words(spec: Spec, scalar: Scalar) -> set[str]:
     """What follows the filter's name in the names of its helpers, private functions and tables."""
-    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach"}
+    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach", "draws"}
     words |= {f"{kind}_{sensor.name}" for kind in ("h", "see", "recall") for sensor in spec.measurements}
     modes = spec.imm.modes if spec.imm else ()
     return words | {f"{word}_{mode.name}" for word in words for mode in modes}

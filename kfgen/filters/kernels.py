@@ -158,8 +158,8 @@ def carlson(kernels: Kernels, n: int, sure: bool, weighted: bool, moves: bool) -
         with t.loop("i", 0, first) as i:
             b[i] = 0
         s = t.variable("sum", t.field("r"))
-        root, inverse = root_of(t, s.get())
-        before, per_before = t.variable("before", root), t.variable("per_before", inverse)
+        before = t.variable("before", sqrt(s.get()))
+        per_before = t.variable("per_before", 0)  # at first it is multiplied by b, which is zero: 1 / 0 would not be
         with t.loop("j", first, n) as j:
             d = t.name(D[j], "d")
             product = t.variable("product", h[j] * d)

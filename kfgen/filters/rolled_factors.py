@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.kernels import absorb
+from kfgen.filters.kernels_points import remove
 from kfgen.filters.linalg import Rows, Vector
 from kfgen.filters.looped import Given, Kernels, Space, fill, integer
 from kfgen.filters.noise import NEGATIVE, Additive, Factored
@@ -43,7 +44,7 @@ class Absorber:
         """
         t = space.t
         t.section("Q")
-        sure = self._start(t, space, Q)
+        sure = self.start(t, space, Q)
         w = self.columns(space)
         for _, d in noise:
             require_nonnegative(d, NEGATIVE)
@@ -98,6 +99,18 @@ class Absorber:
         arrays: list[Given] = [(each.name, 0) for each in (U, D, self.columns(space))]
         space.t.call(absorb(self.kernels, self.n, sure), [*arrays, *weights, count])
 
+    def remove(self, space: Space, c: Array, s: Value, tolerance: Fraction, known: Fraction | None) -> Value:
+        """- c c^T / s; the condition that the result is indefinite beyond `tolerance`. known: a D up to this part of
+        the variance is a direction without spread."""
+        t = space.t
+        left = space.array("left", 1)
+        arrays: list[Given] = [(each.name, 0) for each in (*self.arrays(space), c)]
+        limits = [] if known is None else [t.value(known)]
+        t.call(remove(self.kernels, self.n, known is None), [*arrays, s, *limits, (left.name, 0)])
+        rest = t.name(left[0], "left_over")
+        t.flag(rest < 0, "REGULARIZED")
+        return ~(rest >= -(s * tolerance))
+
     def learn(self, space: Space, field: str, rate: Fraction, sure: bool, steps: list[tuple[Array, Value]]) -> None:
         """See Rolled.learn; the field holds the factors as a Kept does."""
         n, t = self.n, space.t
@@ -127,7 +140,7 @@ class Absorber:
         put(t, self.columns(space).__setitem__, {i: x for i, x in enumerate([*a, *b]) if not is_zero(x)})
         self.absorb(space, sure, [weight_a, weight_b], integer(t, last + 1))
 
-    def _start(self, t: Trace, space: Space, Q: Additive) -> bool:
+    def start(self, t: Trace, space: Space, Q: Additive) -> bool:
         """The arrays hold the factors of Q; whether all of D is known to be positive."""
         n = self.n
         U, D = self.arrays(space)

@@ -12,7 +12,7 @@ from kfgen.filters.looped import Space, integer
 from kfgen.filters.mixing import Joining, heaviest, joining
 from kfgen.filters.numbers import Number, assume_nonnegative, is_zero, reciprocal
 from kfgen.filters.rolled_full import RolledFull
-from kfgen.filters.rolled_sqrt import RolledSqrt
+from kfgen.filters.rolled_sqrt import RolledSqrt, Root
 from kfgen.filters.rolled_ud import RolledUD
 from kfgen.filters.runs import Put
 from kfgen.filters.ud import column, triangle
@@ -202,12 +202,7 @@ class _Mixture:
             absorber.add(self.space, column_of, factor)
         self._spread(layout)
         layout.take_roots(self.space)
-        S = self.space.array("S", n * (n + 1) // 2)
-        with t.loop("j", 0, n) as j:
-            with t.loop("i", 0, j) as i:
-                S[layout.spot(t, i, j)] = U[triangle(j) + i]
-            S[layout.spot(t, j, j)] = D[j]
-        return {"kf.S": S}
+        return layout.placed(Root(self.space, own=True))
 
     def _spread(self, layout: RolledUD | RolledSqrt) -> None:
         """The columns of the spread, two at a time."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from kfgen.filters.kernels import carlson
+from kfgen.filters.kernels_points import remove_root
 from kfgen.filters.linalg import Measurement, Rows, Vector
-from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, integer, next_gain
+from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, fill, integer, next_gain
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, assume_nonnegative, constant_root, is_positive, select, sqrt
 from kfgen.filters.rolled_factors import Absorber
@@ -16,7 +17,7 @@ from kfgen.filters.runs import Put
 from kfgen.filters.sqrt import Sqrt
 from kfgen.filters.symmetric import Symmetric
 from kfgen.filters.ud import packed, triangle
-from kfgen.ir.trace import Trace, Value
+from kfgen.ir.trace import Array, Trace, Value
 
 
 @dataclass(frozen=True)
@@ -135,6 +136,38 @@ class RolledSqrt(Sqrt):
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         self.absorber.learn(moved.space, field, rate, sure, moved.terms)
+
+    def downdated(  # type: ignore[override]
+        self, t: Trace, P: Root, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Root
+    ) -> tuple[Root, Value]:
+        n, space = self.n, P.space
+        if "small" not in space.arrays:
+            small = space.array("small", n)
+            with t.loop("j", 0, n) as j:
+                last = t.name(self._diagonal(prior, j), "last")
+                total = t.variable("total", last * last)
+                with t.loop("k", j + 1, n) as k:
+                    s_jk = t.name(self._at(prior, j, k), "s_jk")
+                    total.set(total.get() + s_jk * s_jk)
+                small[j] = total.get() * (tolerance * tolerance)
+        P = self._owned(P)
+        array, told = space.array("c", n), space.array("told", 2)
+        fill(t, array, c)
+        arrays: list[Given] = [(each.name, 0) for each in (*self.absorber.arrays(space), array, space.arrays["small"])]
+        t.call(remove_root(self.kernels, n), [*arrays, t.value(s), t.value(tolerance), (told.name, 0)])
+        t.flag(told[1] > 0, "REGULARIZED")
+        return P, told[0] > 0
+
+    def placed(self, P: Root) -> dict[str, Array]:
+        """A local array that holds P as the field of the struct does."""
+        P = self._owned(P)
+        t, n = P.space.t, self.n
+        S = P.space.array("S", n * (n + 1) // 2)
+        with t.loop("j", 0, n) as j:
+            with t.loop("i", 0, j) as i:
+                S[self.spot(t, i, j)] = self._at(P, i, j)
+            S[self.spot(t, j, j)] = self._diagonal(P, j)
+        return {"kf.S": S}
 
     # the covariance ----------------------------------------------------------------------------------
 

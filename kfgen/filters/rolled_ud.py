@@ -8,16 +8,28 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.kernels import bierman
+from kfgen.filters.kernels_points import solve
 from kfgen.filters.layout import GainChange
 from kfgen.filters.linalg import Measurement, Rows, Vector
-from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, changed_gain, integer, next_gain
+from kfgen.filters.looped import (
+    Column,
+    Displacement,
+    Given,
+    Kernels,
+    Space,
+    at_rest,
+    changed_gain,
+    fill,
+    integer,
+    next_gain,
+)
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, assume_nonnegative, is_positive, is_zero
 from kfgen.filters.rolled_factors import Absorber
 from kfgen.filters.runs import Put
 from kfgen.filters.symmetric import Symmetric
 from kfgen.filters.ud import UD, packed, triangle
-from kfgen.ir.trace import Trace, Value
+from kfgen.ir.trace import Array, Trace, Value
 
 
 @dataclass(frozen=True)
@@ -132,6 +144,28 @@ class RolledUD(UD):
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         self.absorber.learn(moved.space, field, rate, sure, moved.terms)
+
+    def downdated(  # type: ignore[override]
+        self, t: Trace, P: Factors, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Factors
+    ) -> tuple[Factors, Value]:
+        P = self._owned(P)
+        array = P.space.array("c", self.n)
+        fill(t, array, c)
+        known = None if sure else tolerance
+        # the points' rounding is in c
+        return P, self.absorber.remove(P.space, array, t.value(s), 1024 * tolerance, known)
+
+    def solved(self, t: Trace, name: str, c: Vector, tolerance: Fraction) -> Vector:
+        """P^-1 c of the struct's P, in a local array."""
+        array = t.array(name, self.n)
+        fill(t, array, c)
+        t.call(solve(self.kernels, self.n), [("kf.U", 0), ("kf.D", 0), (array.name, 0), t.value(tolerance)])
+        return [array[i] for i in range(self.n)]
+
+    def placed(self, P: Factors) -> dict[str, Array]:
+        """Local arrays that hold P as the fields of the struct do."""
+        U, D = self.absorber.arrays(self._owned(P).space)
+        return {"kf.U": U, "kf.D": D}
 
     # the covariance ----------------------------------------------------------------------------------
 
