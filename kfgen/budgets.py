@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from kfgen.errors import Mistake
@@ -21,7 +21,8 @@ _CURES = {
 
 @dataclass(frozen=True)
 class Prediction:
-    """Bytes. flash: by function, and `constants` for the tables; stack: by function, what it calls included.
+    """Bytes. flash: by function, `constants` for the tables, `routines` for those of fixed point; stack: by function,
+    what it calls included.
 
     Both hold what `kfgen cost` measures: init, predict, the updates, and the private functions that they share.
     ram: by field of the struct.
@@ -38,14 +39,17 @@ class Prediction:
         return {"flash": sum(self.flash.values()), "ram": self.size, "stack": max(self.stack.values(), default=0)}
 
 
-def predict(spec: Spec, code: FilterCode, scalar: Scalar, size: int) -> Prediction:
-    """The prediction for a filter whose struct has `size` bytes."""
+def predict(spec: Spec, code: FilterCode, scalar: Scalar, size: int, routines: Iterable[str] = ()) -> Prediction:
+    """The prediction for a filter whose struct has `size` bytes. routines: of fixed point, that its file holds."""
     names = {"init", "predict", *(f"update_{sensor.name}" for sensor in spec.measurements)}
     counted = [function for function in code.functions if function.private or function.name in names]
     flash = {function.name: footprint.predicted([function], scalar.name) for function in counted}
     tables = sum(3 * (len(table.x) + 1) for table in code.tables) + sum(len(each.numbers) for each in code.lookups)
     if tables:
         flash["constants"] = tables * scalar.size
+    shared = footprint.predicted_routines(routines)
+    if shared:
+        flash["routines"] = shared
     public = [function for function in counted if not function.private]
     stack = {function.name: footprint.predicted_stack(function, scalar.name) for function in public}
     widths = {"real": scalar.size, "uint32": 4, "bool": 1}

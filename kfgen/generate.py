@@ -16,14 +16,16 @@ from kfgen.fixed.scalar import Fixed
 from kfgen.ir.count import operations
 from kfgen.ir.schedule import RESERVED
 from kfgen.logs import Log
-from kfgen.scalars import SCALARS
+from kfgen.scalars import SCALARS, Scalar
 from kfgen.spec.types import Spec
+
+UNROLLED = "no loops in fixed point: an element of a covariance has a binary point of its own, and its own code"
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What the build table shows: operations per function, RAM in bytes, remarks, flash and stack as predicted (not of
-    fixed point), loops or unrolled, where chosen."""
+    """What the build table shows: operations per function, RAM in bytes, remarks, flash and stack as predicted,
+    loops or unrolled, where chosen."""
 
     rows: list[tuple[str, dict[str, int]]]
     ram: int
@@ -53,7 +55,7 @@ def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judg
     if scalar is not None:
         spec = replace(spec, scalar=scalar)
     if spec.scalar not in SCALARS:
-        return _fixed(spec, overridden, log)
+        return _fixed(spec, overridden, log, judge)
     code = build_filter(spec, SCALARS[spec.scalar], RESERVED)
     try:
         view = make_view(code, SCALARS[spec.scalar], overridden)
@@ -62,19 +64,28 @@ def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judg
         raise SpecError.at(
             place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
         ) from None
-    prediction = predict(spec, code, SCALARS[spec.scalar], view.ram)
-    mistakes = exceeded(spec, prediction)
-    if judge and mistakes:
-        raise SpecError(mistakes)
+    prediction = _predicted(spec, code, SCALARS[spec.scalar], view, judge)
     return Generated(render(view), replace(summary(code, view), prediction=prediction), code, view)
 
 
-def _fixed(spec: Spec, overridden: bool, log: Log | None) -> Generated:
+def _predicted(spec: Spec, code: FilterCode, scalar: Scalar, view: View, judge: bool) -> Prediction:
+    """Held against the spec's budgets, if they are to be judged."""
+    routines = () if view.routines is None else (*view.routines.ops, *view.routines.own)
+    prediction = predict(spec, code, scalar, view.ram, routines)
+    mistakes = exceeded(spec, prediction)
+    if judge and mistakes:
+        raise SpecError(mistakes)
+    return prediction
+
+
+def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Generated:
     scalar = Fixed(spec.scalar, spec.fixed.rounding)
     real = build_filter(spec, scalar, RESERVED)
     result = build_fixed(real, scalar, log)
     view = make_view(result.code, scalar, overridden, result.view)
-    told = summary(real, view)
+    told = replace(summary(real, view), prediction=_predicted(spec, result.code, scalar, view, judge))
+    if spec.code.unroll == "none":
+        told.notes.append(UNROLLED)
     told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
     return Generated(render(view), told, result.code, view, result)
 

@@ -18,6 +18,8 @@ from kfgen.spec.types import Spec
 
 ROWS = 60
 """Rows of a log that are run if not said otherwise."""
+BEFORE = 0.01
+"""The step in s before a log's first row, which none is known of: so that every row is predicted and updated."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,8 @@ class Job:
 
 
 def make_job(spec: Spec, files: Mapping[str, str], log: Log, rows: int = ROWS) -> Job:
-    """The first `rows` rows of a log as calls, as `kfgen run` makes them. KfgenError for a log that does not fit."""
+    """The first `rows` rows of a log as calls, as `kfgen run` makes them, and a prediction before the first row where
+    the step is given at run time. KfgenError for a log that does not fit."""
     header = parse(files[f"{spec.name}.h"], spec.name)
     log = as_log(log, spec)
     log = Log({name: column[:rows] for name, column in log.columns.items()}, min(rows, log.rows), log.source)
@@ -102,6 +105,8 @@ def _calls(name: str, header: Header, functions: Sequence[str]) -> dict[str, str
 
 def _steps(spec: Spec, header: Header, log: Log) -> list[Step]:
     work = plan(spec, log)
+    if spec.dt is not None and spec.dt.run_time and log.rows:
+        work.dt[0], work.step[0] = BEFORE, 1
     scalar = value_of(header)
     units = Units(spec, scalar)
     steps: list[Step] = []

@@ -17,8 +17,9 @@ from kfgen.ir.trace import Array, Trace, Value, Variable
 class Scope:
     """A mode: its name, and the names of its fields in the struct.
 
-    given: values that stand for elements of its fields, as path -> index -> value. arrays: local arrays that hold
-    those too, for loops. renamed: its names of local arrays and variables -> the names that they have.
+    given: values that stand for elements of its fields, as path -> index -> value. arrays: local arrays that stand
+    for fields, or hold what is given, for loops. renamed: its names of local arrays and variables -> the names that
+    they have.
     """
 
     mode: str
@@ -85,6 +86,8 @@ class BankTrace(Trace):
         if scope is not None and path in scope.given:
             at = index if isinstance(index, int) else index.constant
             return scope.arrays[path][index] if at is None else scope.given[path][int(at)]
+        if scope is not None and path in scope.arrays:
+            return scope.arrays[path][index]
         return super().element(self._path(path), index)
 
     def store(self, name: str, index: int | Value | None, value: Value) -> None:
@@ -125,6 +128,8 @@ class BankTrace(Trace):
             if not isinstance(argument, tuple):
                 return argument
             name, offset = argument
+            if self.scope is not None and name in self.scope.arrays:
+                return self.scope.arrays[name].name, offset
             if self.scope is not None and name in self.scope.renamed:
                 return self.scope.renamed[name], offset
             return self._path(name), offset

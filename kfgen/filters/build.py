@@ -30,7 +30,6 @@ from kfgen.filters.sqrt import Sqrt
 from kfgen.filters.steady import Steady
 from kfgen.filters.ud import UD
 from kfgen.filters.ukf import Ukf
-from kfgen.filters.unbuilt import unbuilt
 from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import roots, walk
 from kfgen.ir.trace import Trace
@@ -47,34 +46,22 @@ _FILTERS: dict[str, Callable[[Model, Layout, Scalar], Ekf]] = {
 def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
     """The filter of a spec. taken: names that locals must not have.
 
-    Raises SpecError for what is not built yet and for what only the model can tell.
+    Raises SpecError for what only the model can tell.
     """
-    missing = unbuilt(spec)
-    if missing:
-        raise SpecError(missing)
     taken |= {f"{spec.name}_{word}" for word in _private_words(spec, scalar)}
-    if spec.imm is not None:
-        return _with_tables(_bank(spec, scalar).code(taken))
-    model = build_model(spec)
-    _check_measurements(model)
-    if spec.filter.gain is not None:
-        return _with_tables(Steady(model, scalar).code(taken))
-    return _with_tables(with_privates(_unrolled_or_not(model, scalar, taken)))
+    emitted = _bank(spec, scalar, taken) if spec.imm is not None else _single(spec, scalar, taken)
+    return _with_tables(with_privates(_unrolled_or_not(spec, scalar, emitted)))
 
 
-def _unrolled_or_not(model: Model, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
+Emitter = Callable[[str], FilterCode]
+"""From full, auto or none to the filter's code."""
+
+
+def _unrolled_or_not(spec: Spec, scalar: Scalar, emitted: Emitter) -> FilterCode:
     """The filter in straight-line code or in loops, as `code` asks."""
-    chosen, layout = model.spec.code, _layout(model, scalar)
-
-    def emitted(unroll: str) -> FilterCode:
-        asked = replace(model, spec=replace(model.spec, code=replace(chosen, unroll=unroll)))
-        own = _rolled(model, layout, scalar, taken) if unroll == "none" else layout
-        by_points = model.spec.filter.type == "ukf"
-        filter_ = _FILTERS[model.spec.filter.type](asked, layout if by_points else own, scalar)
-        filter_.plain = own
-        code = filter_.code(taken)
-        return replace(code, constants={**code.constants, **own.tables})
-
+    chosen = spec.code
+    if spec.filter.gain is not None or not scalar.uniform:
+        return emitted("auto")
     if chosen.flash is None:
         code = emitted(chosen.unroll)
         return told(code, {f.name for f in code.functions}) if chosen.unroll == "none" else code
@@ -83,33 +70,74 @@ def _unrolled_or_not(model: Model, scalar: Scalar, taken: frozenset[str]) -> Fil
     return choose(straight, looped, chosen.flash, chosen.unroll == "none", scalar.name)
 
 
-def _rolled(model: Model, layout: Layout, scalar: Scalar, taken: frozenset[str]) -> Layout:
-    """The same layout in loops; where there is nothing to loop over, as it is."""
-    if layout.n == 1:
-        return layout
-    names = [model.states[i] for i in layout.order]
-    kernels = Kernels(scalar.smallest, taken)
-    steps = model.options.adapt_Q is not None
-    weighted = model.options.influence is not None
-    if isinstance(layout, UD):
-        return RolledUD(layout.order, layout.form, layout.change, names, kernels, weighted, steps, model.spec.name)
-    if isinstance(layout, Sqrt):
-        return RolledSqrt(layout.n, names, kernels, weighted, steps, model.spec.name)
-    if isinstance(layout, Full):
-        return RolledFull(layout, names, kernels, steps)
-    return layout
+def _single(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> Emitter:
+    """A filter by itself."""
+    model = build_model(spec)
+    _check_measurements(model)
+    if spec.filter.gain is not None:
+        return lambda unroll: Steady(model, scalar).code(taken)
+    layout = _layout(model, scalar)
+
+    def emitted(unroll: str) -> FilterCode:
+        own = _rolled((model,), [layout], scalar, taken)[0] if unroll == "none" else layout
+        code = _filter(model, layout, own, scalar, unroll).code(taken)
+        return replace(code, constants={**code.constants, **own.tables})
+
+    return emitted
 
 
-def _single(model: Model, scalar: Scalar, order: list[int] | None = None) -> Ekf:
-    return _FILTERS[model.spec.filter.type](model, _layout(model, scalar, order), scalar)
-
-
-def _bank(spec: Spec, scalar: Scalar) -> Imm:
+def _bank(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> Emitter:
+    """A filter of several modes."""
     bank = build_bank(spec)
     for model in bank.modes:
         _check_measurements(model)
     order = _common_order(bank.modes)
-    return Imm(bank, [_single(model, scalar, order) for model in bank.modes], scalar)
+    layouts = [_layout(model, scalar, order) for model in bank.modes]
+
+    def emitted(unroll: str) -> FilterCode:
+        own = _rolled(bank.modes, layouts, scalar, taken, bank.names) if unroll == "none" else layouts
+        filters = [
+            _filter(model, layout, rolled, scalar, unroll)
+            for model, layout, rolled in zip(bank.modes, layouts, own, strict=True)
+        ]
+        code = Imm(bank, filters, layouts, scalar).code(taken)
+        tables = {name: table for layout in own for name, table in layout.tables.items()}
+        return replace(code, constants={**code.constants, **tables})
+
+    return emitted
+
+
+def _filter(model: Model, layout: Layout, own: Layout, scalar: Scalar, unroll: str) -> Ekf:
+    """own: the layout, in loops if asked for; sigma points come from the layout as it is."""
+    spec = model.spec
+    asked = replace(model, spec=replace(spec, code=replace(spec.code, unroll=unroll)))
+    filter_ = _FILTERS[spec.filter.type](asked, layout if spec.filter.type == "ukf" else own, scalar)
+    filter_.plain = own
+    return filter_
+
+
+def _rolled(
+    models: tuple[Model, ...], layouts: list[Layout], scalar: Scalar, taken: frozenset[str], modes: tuple[str, ...] = ()
+) -> list[Layout]:
+    """The same layouts in loops, which share their private functions; where there is nothing to loop over, as they
+    are."""
+    if layouts[0].n == 1:
+        return layouts
+    kernels = Kernels(scalar.smallest, taken, several=len(models) > 1)
+    steps = any(model.options.adapt_Q is not None for model in models)
+    weighted = any(model.options.influence is not None for model in models)
+    out: list[Layout] = []
+    for place, (model, layout) in enumerate(zip(models, layouts, strict=True)):
+        names = [model.states[i] for i in layout.order]
+        table = (model.spec.name, f"reach_{modes[place]}" if modes else "reach")
+        if isinstance(layout, UD):
+            layout = RolledUD(layout.order, layout.form, layout.change, names, kernels, weighted, steps, table)
+        elif isinstance(layout, Sqrt):
+            layout = RolledSqrt(layout.n, names, kernels, weighted, steps, table)
+        elif isinstance(layout, Full):
+            layout = RolledFull(layout, names, kernels, steps)
+        out.append(layout)
+    return out
 
 
 def _layout(model: Model, scalar: Scalar, order: list[int] | None = None) -> Layout:
@@ -198,7 +226,7 @@ def _order(models: tuple[Model, ...]) -> list[int]:
 
 def _private_words(spec: Spec, scalar: Scalar) -> set[str]:
     """What follows the filter's name in the names of its helpers, private functions and tables."""
-    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb"}
+    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach", "draws"}
     words |= {f"{kind}_{sensor.name}" for kind in ("h", "see", "recall") for sensor in spec.measurements}
     modes = spec.imm.modes if spec.imm else ()
     return words | {f"{word}_{mode.name}" for word in words for mode in modes}

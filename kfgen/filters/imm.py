@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import sympy
 
@@ -19,15 +20,17 @@ from kfgen.filters.base import KF, Block, FilterCode, ModeNote
 from kfgen.filters.dual import Dual, Evaluator
 from kfgen.filters.ekf import LONG_FUNCTIONS, Ekf
 from kfgen.filters.gate import gate, smallest, store_outcome
+from kfgen.filters.layout import Layout, Rolled
 from kfgen.filters.mixing import Estimate, mixed, normalised, spread, transition
 from kfgen.filters.numbers import Number, assume_positive, select
 from kfgen.filters.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.process import Step
+from kfgen.filters.rolled_mixing import Source, alike, mixed_in_loops
 from kfgen.filters.shared import shared
 from kfgen.filters.state import StateCode
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
-from kfgen.ir.trace import Trace, Value
+from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
 from kfgen.model.bank import BankModel
 from kfgen.model.model import SensorModel
@@ -41,6 +44,7 @@ class Mode:
     name: str
     filter: Ekf
     blocks: tuple[Block, ...]
+    layout: Layout  # of the mixtures that are not made in loops
 
     def scope(self) -> Scope:
         return Scope(self.name, frozenset(block.name for block in self.blocks))
@@ -54,16 +58,21 @@ class Mode:
 
 
 class Imm:
-    """Emits a bank of filters. bank: the model; filters: those of the modes."""
+    """Emits a bank of filters. bank: the model; filters: those of the modes; layouts: theirs, not in loops."""
 
-    def __init__(self, bank: BankModel, filters: Sequence[Ekf], scalar: Scalar) -> None:
+    def __init__(
+        self, bank: BankModel, filters: Sequence[Ekf], layouts: Sequence[Layout], scalar: Scalar
+    ) -> None:
         self.bank = bank
         self.model = bank.head
         self.scalar = scalar
         # what is to stay above 0 must not become 0 by the rounding of mu
         self.floor = max(bank.mu_floor, scalar.probability) if bank.mu_floor > 0 else bank.mu_floor
         self.lively = bank.lively(scalar.smallest, scalar.probability)
-        self.modes = [Mode(name, f, f.own_blocks()) for name, f in zip(bank.names, filters, strict=True)]
+        self.modes = [
+            Mode(name, f, f.own_blocks(), layout) for name, f, layout in zip(bank.names, filters, layouts, strict=True)
+        ]
+        self.mixes_in_loops = alike([cast(Rolled, f.plain) for f in filters])
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
         fields = [
             replace(block, name=f"modes.{mode.name}.{block.name}") for mode in self.modes for block in mode.blocks
@@ -123,7 +132,7 @@ class Imm:
         for mode, scope in zip(self.modes, scopes, strict=True):
             with t.of(scope):
                 x = [t.name(t.element("kf.x", i), name) for i, name in enumerate(self.model.states)]
-                layout = mode.filter.layout
+                layout = mode.layout
                 P = layout.load(t)
                 if not layout.factored:  # entries are read when they are first asked for: here
                     _ = [P[i, j] for j in range(layout.n) for i in range(j + 1)]
@@ -156,9 +165,7 @@ class Imm:
             for j, now in enumerate(self.modes):
                 t.name(t.value(w[i][j]), f"w_{before.name}_{now.name}")
         t.settle()
-        parts = self._loaded(t, scopes)
-        for j, (mode, scope) in enumerate(zip(self.modes, scopes, strict=True)):
-            self._mix(t, mode, scope, parts, [w[i][j] for i in range(len(parts))], j)
+        self._mix_all(t, scopes, w)
         runs: list[tuple[Scope, Phases]] = []
         made: list[Made] = []
         for mode, scope in zip(self.modes, scopes, strict=True):
@@ -193,6 +200,28 @@ class Imm:
             for row, total, ok in zip(rows, sums, exact, strict=True)
         ]
 
+    def _mix_all(self, t: BankTrace, scopes: list[Scope], w: list[list[Number]]) -> None:
+        """Have every mode start from its mixture."""
+        weights = [[row[j] for row in w] for j in range(len(scopes))]
+        if not self.mixes_in_loops:
+            parts = self._loaded(t, scopes)
+            for j, (mode, scope) in enumerate(zip(self.modes, scopes, strict=True)):
+                self._mix(t, mode, scope, parts, weights[j], j)
+            return
+        sources = [
+            Source(scope, cast(Rolled, mode.filter.plain), mode.filter.covariance.place(t))
+            for mode, scope in zip(self.modes, scopes, strict=True)
+        ]
+        mixtures: list[dict[str, Array]] = []
+        for j, scope in enumerate(scopes):
+            alone = all(i == j or _is_nothing(weight) for i, weight in enumerate(weights[j]))
+            if not alone:
+                with t.of(scope):
+                    t.section("where it starts from")
+            mixtures.append({} if alone else mixed_in_loops(t, self.model, sources, weights[j], j))
+        for scope, arrays in zip(scopes, mixtures, strict=True):
+            scope.arrays.update(arrays)
+
     def _mix(self, t: BankTrace, mode: Mode, scope: Scope, parts: list[Estimate], w: list[Number], own: int) -> None:
         """Have the mode start from its mixture; where none joins it, from its own estimate as it stands."""
         if all(i == own or _is_nothing(weight) for i, weight in enumerate(w)):
@@ -203,9 +232,9 @@ class Imm:
             x = [v if p is None else t.wrap(v, p) for v, p in zip(mixture.mean, self.model.periods, strict=True)]
             P = mixed(t, parts, w, mixture, own)
             with t.capture() as captured:
-                mode.filter.layout.store(t, P, mode.filter.names, after_predict=False)
+                mode.layout.store(t, P, mode.filter.names, after_predict=False)
             scope.given = {"kf.x": dict(enumerate(x)), **captured}
-        if mode.filter.predicts_in_loops:
+        if mode.filter.predicts_in_loops or mode.filter.plain.rolled:
             t.materialise(scope, captured)
 
     # update ------------------------------------------------------------------------------------------

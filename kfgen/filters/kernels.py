@@ -66,7 +66,7 @@ def absorb(kernels: Kernels, n: int, sure: bool) -> Function:
     arguments = [array_argument("factor", size), array_argument("diagonal", n), array_argument("w", 2 * n),
                  number_argument("weight_a"), number_argument("weight_b"), counter_argument("count")]  # fmt: skip
     doc = "U D U^T += weight_a a a^T + weight_b b b^T; w holds a and b, zero from `count` on, and is zeroed"
-    return kernels.function("absorb" if sure else "absorb_any", arguments, doc, body)
+    return kernels.function("absorb_pair" if sure else "absorb_any_pair", arguments, doc, body)
 
 
 def bierman(kernels: Kernels, n: int, single: bool, sure: bool, weighted: bool, moves: bool) -> Function:
@@ -158,8 +158,8 @@ def carlson(kernels: Kernels, n: int, sure: bool, weighted: bool, moves: bool) -
         with t.loop("i", 0, first) as i:
             b[i] = 0
         s = t.variable("sum", t.field("r"))
-        root, inverse = root_of(t, s.get())
-        before, per_before = t.variable("before", root), t.variable("per_before", inverse)
+        before = t.variable("before", sqrt(s.get()))
+        per_before = t.variable("per_before", 0)  # at first it is multiplied by b, which is zero: 1 / 0 would not be
         with t.loop("j", first, n) as j:
             d = t.name(D[j], "d")
             product = t.variable("product", h[j] * d)
@@ -203,7 +203,7 @@ def carlson(kernels: Kernels, n: int, sure: bool, weighted: bool, moves: bool) -
     arguments.append(array_argument("s", 2))
     doc = "Carlson's update by a measurement of h x, of variance r; h is zero before `first` and after `last`"
     doc += ". s: its innovation variance" + (", and nu^2 over it; moved += gain nu" if moves else "")
-    return kernels.function("measure" + "_gain" * (not moves) + "_any" * (not sure), arguments, doc, body)
+    return kernels.function("measure_root" + "_gain" * (not moves) + "_any" * (not sure), arguments, doc, body)
 
 
 def take_row(kernels: Kernels, n: int) -> Function:

@@ -144,6 +144,10 @@ class Layout(Protocol):
 class Rolled(Layout, Protocol):
     """A layout that is emitted as loops."""
 
+    def placed(self, P: Covariance) -> dict[str, Array]:
+        """Local arrays that hold P as the fields of the struct do, by the paths of these."""
+        ...
+
     def learn(self, moved: Any, field: str, rate: Fraction, sure: bool) -> None:
         """Q <- (1 - rate) Q + rate times the sum of dx dx^T, in a field of the struct. sure: Q is known to be definite.
 

@@ -37,7 +37,8 @@ class Space:
         """An array of a gain, to be written. What gains before it have moved the state by is then no longer read from
         it; moved: that, if there were any."""
         waiting = moved if isinstance(moved, Displacement) else None
-        if waiting is not None and any(gain.name == name for gain, _ in waiting.terms):
+        known = self.arrays.get(name)
+        if waiting is not None and any(gain == known for gain, _ in waiting.terms):
             waiting.settle()
         return self.array(name, size)
 
@@ -175,12 +176,14 @@ def changed_gain(t: Trace, change: GainChange, gain: Array, difference: Array | 
 class Kernels:
     """The private functions of a filter's loops, each traced when it is first called.
 
-    taken: names that locals must not have. smallest: see Trace.
+    taken: names that locals must not have. smallest: see Trace. several: whether several filters share them; none then
+    counts on what only some of these know.
     """
 
-    def __init__(self, smallest: Fraction, taken: frozenset[str]) -> None:
+    def __init__(self, smallest: Fraction, taken: frozenset[str], several: bool = False) -> None:
         self.smallest = smallest
         self.taken = taken
+        self.several = several
         self.made: dict[str, Function] = {}
 
     def function(

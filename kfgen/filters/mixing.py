@@ -7,6 +7,7 @@ B modes takes B - 1 columns, and none is ever taken away.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from kfgen.filters import linalg
@@ -43,6 +44,32 @@ class Spread:
     columns: list[tuple[Vector, Number]]
 
 
+@dataclass(frozen=True)
+class Joining:
+    """How a part joins the mixture of those before it. before: their weight; share: the part's in both."""
+
+    before: Number
+    share: Number
+
+    @property
+    def weight(self) -> Number:
+        """Of the spread between them."""
+        return times(self.before, self.share)
+
+
+def joining(weights: list[Number], parts: list[int]) -> Iterator[Joining]:
+    """Of all parts but the first. weights: those of the parts sum to 1."""
+    weight = weights[parts[0]]
+    for place, i in enumerate(parts[1:], 1):
+        share = weights[i]
+        if place < len(parts) - 1:
+            total = weight + weights[i]
+            share = times(share, 1 / total if is_positive(total) else reciprocal(assume_nonnegative(total))[1])
+        yield Joining(weight, share)
+        if place < len(parts) - 1:
+            weight = total
+
+
 def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Number], first: int) -> Spread:
     """Of modes whose weights sum to 1. first: the mode that the others join."""
     parts = [first, *(i for i in range(len(states)) if i != first)]
@@ -51,7 +78,7 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
     straight = sorted(parts)
     for k, period in enumerate(model.periods):
         if period is not None and len(parts) > 1:
-            base[k] = t.name(_heaviest([states[i][k] for i in straight], [weights[i] for i in straight]),
+            base[k] = t.name(heaviest([states[i][k] for i in straight], [weights[i] for i in straight]),
                              f"{model.states[k]}_base")  # fmt: skip
     deltas: list[Vector] = []
     for i in parts:
@@ -61,23 +88,15 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
             delta.append(d if is_zero(d) or period is None else t.wrap(d, period))
         deltas.append(delta)
     mean = deltas[0]
-    weight = weights[parts[0]]
     columns: list[tuple[Vector, Number]] = []
-    for place, i in enumerate(parts[1:], 1):
-        last = place == len(parts) - 1
-        share = weights[i]
-        if not last:
-            total = weight + weights[i]
-            share = times(weights[i], 1 / total if is_positive(total) else reciprocal(assume_nonnegative(total))[1])
-        e = [linalg.minus(d, m) for d, m in zip(deltas[place], mean, strict=True)]
-        columns.append((e, times(weight, share)))
-        mean = [plus(m, times(share, d)) for m, d in zip(mean, e, strict=True)]
-        if not last:
-            weight = total
+    for delta, step in zip(deltas[1:], joining(weights, parts), strict=True):
+        e = [linalg.minus(d, m) for d, m in zip(delta, mean, strict=True)]
+        columns.append((e, step.weight))
+        mean = [plus(m, times(step.share, d)) for m, d in zip(mean, e, strict=True)]
     return Spread([t.value(plus(b, m)) for b, m in zip(base, mean, strict=True)], columns)
 
 
-def _heaviest(values: list[Value], weights: list[Number]) -> Value:
+def heaviest(values: list[Value], weights: list[Number]) -> Value:
     """The value of the largest weight, the first of equals."""
     value, weight = values[0], weights[0]
     for v, w in zip(values[1:], weights[1:], strict=True):

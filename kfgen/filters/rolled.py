@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 from kfgen.filters import linalg
@@ -19,21 +20,29 @@ from kfgen.ir.trace import Array, Trace, Value
 FROM = 9  # states from which on loops are used; straight-line code would be 10 kB and more
 
 Weight = Value | Fraction
+Element = Callable[[str, Value], Value]
 
 
-def root(t: Trace, layout: Layout, tolerance: Fraction) -> Array:
-    """A local array with the columns of a root of the stored covariance, column after column, in the spec's order."""
+def root(t: Trace, layout: Layout, tolerance: Fraction, own: Mapping[str, Array] | None = None) -> Array:
+    """A local array with the columns of a root of the stored covariance, column after column, in the spec's order.
+
+    own: arrays that hold another covariance as the fields of the struct do.
+    """
     n = layout.n
-    out = t.array("root", n * n)
+
+    def of(path: str, index: Value) -> Value:
+        return t.element(path, index) if own is None else own[path][index]
+
+    out = t.array(t.unique("root"), n * n)
     with t.loop("j", 0, n) as j:
         if not layout.factored:
-            _cholesky_column(t, n, out, j, tolerance)
+            _cholesky_column(t, n, out, j, tolerance, of)
             with t.loop("i", 0, j) as i:
                 out[j * n + i] = 0
         elif layout.reorders:  # U D U^T
-            scale = t.name(sqrt(assume_nonnegative(t.element("kf.D", j))), "scale")
+            scale = t.name(sqrt(assume_nonnegative(of("kf.D", j))), "scale")
             with t.loop("i", 0, j) as i:
-                out[j * n + i] = t.element("kf.U", triangle(j) + i) * scale
+                out[j * n + i] = of("kf.U", triangle(j) + i) * scale
             out[j * n + j] = scale
             with t.loop("i", j + 1, n) as i:
                 out[j * n + i] = 0
@@ -41,13 +50,14 @@ def root(t: Trace, layout: Layout, tolerance: Fraction) -> Array:
             with t.loop("i", 0, j) as i:
                 out[j * n + i] = 0
             with t.loop("i", j, n) as i:
-                out[j * n + i] = t.element("kf.S", column(i) + j)
+                out[j * n + i] = of("kf.S", column(i) + j)
     return out
 
 
-def _cholesky_column(t: Trace, n: int, out: Array, j: Value, tolerance: Fraction) -> None:
-    """Column j of the lower root of kf.P, those before it being known."""
-    diagonal = t.name(t.element("kf.P", column(j) + j), "diagonal")
+def _cholesky_column(t: Trace, n: int, out: Array, j: Value, tolerance: Fraction, of: Element
+) -> None:  # fmt: skip
+    """Column j of the lower root of P, those before it being known."""
+    diagonal = t.name(of("kf.P", column(j) + j), "diagonal")
     pivot = t.variable("pivot", diagonal)
     with t.loop("k", 0, j) as k:
         pivot.set(pivot.get() - out[k * n + j] * out[k * n + j])
@@ -58,7 +68,7 @@ def _cholesky_column(t: Trace, n: int, out: Array, j: Value, tolerance: Fraction
     inverse = t.name(select(left > limit, 1 / length, 0), "inverse")
     out[j * n + j] = length
     with t.loop("i", j + 1, n) as i:
-        rest = t.variable("rest", t.element("kf.P", column(i) + j))
+        rest = t.variable("rest", of("kf.P", column(i) + j))
         with t.loop("k", 0, j) as k:
             rest.set(rest.get() - out[k * n + i] * out[k * n + j])
         out[j * n + i] = rest.get() * inverse

@@ -7,8 +7,9 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.kernels import absorb
+from kfgen.filters.kernels_points import remove
 from kfgen.filters.linalg import Rows, Vector
-from kfgen.filters.looped import Kernels, Space, fill, integer
+from kfgen.filters.looped import Given, Kernels, Space, fill, integer
 from kfgen.filters.noise import NEGATIVE, Additive, Factored
 from kfgen.filters.numbers import assume_nonnegative, is_one, is_positive, is_zero, require_nonnegative
 from kfgen.filters.runs import Put, put
@@ -19,14 +20,15 @@ from kfgen.ir.trace import Array, Trace, Value
 class Absorber:
     """U and D in the local arrays `factor` (strict upper triangle by columns) and `diagonal`, and what they absorb.
 
-    names: of the states in the inner order. prefix: the filter's name. tables: see Layout.
+    names: of the states in the inner order. table: the name of a table in the emitted file. tables: see Layout.
     """
 
-    def __init__(self, names: list[str], kernels: Kernels, prefix: str) -> None:
+    def __init__(self, names: list[str], kernels: Kernels, table: tuple[str, str]) -> None:
+        """table: the filter's name, and what follows it."""
         self.n = len(names)
         self.names = names
         self.kernels = kernels
-        self.prefix = prefix
+        self.table = table
         self.tables: dict[str, tuple[int, ...]] = {}
 
     def arrays(self, space: Space) -> tuple[Array, Array]:
@@ -40,27 +42,46 @@ class Absorber:
 
         column_of(k, entry): gives the entries 0 to k of c_k, those after are zero. c_0 is the first unit vector.
         """
-        n, t = self.n, space.t
+        t = space.t
         t.section("Q")
-        sure = self._start(t, space, Q)
+        sure = self.start(t, space, Q)
         w = self.columns(space)
         for _, d in noise:
             require_nonnegative(d, NEGATIVE)
         if noise:
             t.section("process noise")
         for c in range(0, len(noise), 2):
-            self._absorb_columns(space, sure, noise[c : c + 2])
+            self.absorb_columns(space, sure, noise[c : c + 2])
         t.section(title)
+        self._all_columns(space, sure, [row[0] for row in F], column_of, weight,
+                          lambda start: self._transition(t, F, w, start), lambda pair: self._reach(t, F, pair))
+
+    def add(
+        self, space: Space, column_of: Callable[[Value, Put], None], weight: Callable[[int | Value], Value]
+    ) -> None:
+        """+ sum of weight_k c_k c_k^T, columns as of `run`."""
+        n, t = self.n, space.t
+        self.columns(space)
+        unit: Vector = [t.one, *[t.zero] * (n - 1)]
+        self._all_columns(space, False, unit, column_of, weight, lambda start: None, lambda k: 2 * k + (2 + n % 2))
+
+    def _all_columns(
+        self, space: Space, sure: bool, first: Vector, column_of: Callable[[Value, Put], None],
+        weight: Callable[[int | Value], Value], change: Callable[[Value], None], reach: Callable[[Value], Value],
+    ) -> None:  # fmt: skip
+        """Columns in pairs. first: column 0 when changed. change: a column in w from a place on. reach: of a pair, how
+        many leading entries may differ from zero."""
+        n, t, w = self.n, space.t, self.columns(space)
         if n % 2:
-            self._absorb_columns(space, sure, [([row[0] for row in F], assume_nonnegative(weight(0)))])
+            self.absorb_columns(space, sure, [(first, assume_nonnegative(weight(0)))])
         with t.loop("pair", 0, n // 2) as pair:
             k = 2 * pair + n % 2
             with t.loop("side", 0, 2) as side:
                 start = side * n
                 column_of(k + side, lambda i, value: w.__setitem__(start + i, value))
-                self._transition(t, F, w, start)
+                change(start)
             weights = [assume_nonnegative(weight(place)) for place in (k, k + 1)]
-            self.absorb(space, sure, weights, self._reach(t, F, pair))
+            self.absorb(space, sure, weights, reach(pair))
 
     def columns(self, space: Space) -> Array:
         """Two columns to be absorbed, at zero; so they are afterwards."""
@@ -74,7 +95,21 @@ class Absorber:
     def absorb(self, space: Space, sure: bool, weights: list[Value], count: Value) -> None:
         """The two columns, of which `count` leading entries may differ from zero. sure: D is known to be positive."""
         U, D = self.arrays(space)
-        space.t.call(absorb(self.kernels, self.n, sure), [(U.name, 0), (D.name, 0), ("w", 0), *weights, count])
+        sure = sure and not self.kernels.several
+        arrays: list[Given] = [(each.name, 0) for each in (U, D, self.columns(space))]
+        space.t.call(absorb(self.kernels, self.n, sure), [*arrays, *weights, count])
+
+    def remove(self, space: Space, c: Array, s: Value, tolerance: Fraction, known: Fraction | None) -> Value:
+        """- c c^T / s; the condition that the result is indefinite beyond `tolerance`. known: a D up to this part of
+        the variance is a direction without spread."""
+        t = space.t
+        left = space.array("left", 1)
+        arrays: list[Given] = [(each.name, 0) for each in (*self.arrays(space), c)]
+        limits = [] if known is None else [t.value(known)]
+        t.call(remove(self.kernels, self.n, known is None), [*arrays, s, *limits, (left.name, 0)])
+        rest = t.name(left[0], "left_over")
+        t.flag(rest < 0, "REGULARIZED")
+        return ~(rest >= -(s * tolerance))
 
     def learn(self, space: Space, field: str, rate: Fraction, sure: bool, steps: list[tuple[Array, Value]]) -> None:
         """See Rolled.learn; the field holds the factors as a Kept does."""
@@ -96,7 +131,7 @@ class Absorber:
                 t.store(field, column(j) + i, U[triangle(j) + i])
             t.store(field, column(j) + j, D[j])
 
-    def _absorb_columns(self, space: Space, sure: bool, columns: list[tuple[Vector, Value]]) -> None:
+    def absorb_columns(self, space: Space, sure: bool, columns: list[tuple[Vector, Value]]) -> None:
         """One or two columns (vector, weight), of which the entries are known one by one."""
         t, n = space.t, self.n
         none: tuple[Vector, Value] = ([t.zero] * n, t.zero)
@@ -105,7 +140,7 @@ class Absorber:
         put(t, self.columns(space).__setitem__, {i: x for i, x in enumerate([*a, *b]) if not is_zero(x)})
         self.absorb(space, sure, [weight_a, weight_b], integer(t, last + 1))
 
-    def _start(self, t: Trace, space: Space, Q: Additive) -> bool:
+    def start(self, t: Trace, space: Space, Q: Additive) -> bool:
         """The arrays hold the factors of Q; whether all of D is known to be positive."""
         n = self.n
         U, D = self.arrays(space)
@@ -139,5 +174,5 @@ class Absorber:
         counts = [1 + max(last[: j + 1]) for j in range(1 + n % 2, n, 2)]
         if counts == [n] * len(counts):
             return integer(t, n)
-        self.tables = {"reach": tuple(counts)}
-        return t.wrapped(t.pool.make("element", (pair.node,), f"{self.prefix}_reach", "int"))
+        self.tables = {self.table[1]: tuple(counts)}
+        return t.wrapped(t.pool.make("element", (pair.node,), "_".join(self.table), "int"))

@@ -10,7 +10,7 @@ from kfgen.filters.base import Block
 from kfgen.filters.full import Full, packed
 from kfgen.filters.kernels import add_terms, put_row, take_row
 from kfgen.filters.linalg import Measurement, Rows, Vector
-from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, changed_gain, integer, next_gain
+from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, changed_gain, fill, integer, next_gain
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, is_constant, is_one, is_positive, is_zero, reciprocal, select, sqrt
 from kfgen.filters.rolled_entries import Entries, Term
@@ -65,11 +65,11 @@ class RolledFull(Full):
                 a[j * n + i] = a[i * n + j]
                 a[i * n + j] = value
         t.section("+ Q")
-        self._add(t, a, additive, noise)
-        return Entries(space, "product", square=True)
+        self.add_noise(t, a, additive, noise, square=True)
+        return Entries(space, a.name, square=True)
 
-    def _add(self, t: Trace, a: Array, Q: Rows, noise: list[tuple[Vector, Value]]) -> None:
-        """Q and d w w^T, entry by entry where they are sparse, the upper triangle."""
+    def add_noise(self, t: Trace, a: Array, Q: Rows, noise: list[tuple[Vector, Value]], square: bool) -> None:
+        """Q and d w w^T, entry by entry where they are sparse, the upper triangle of a square or a packed array."""
         n = self.n
         sparse: dict[tuple[int, int], Value] = {}
         kept = self._kept(Q)
@@ -82,15 +82,18 @@ class RolledFull(Full):
                     sparse[row, col] = t.value(total)
         if kept:
             with t.loop("j", 0, n) as j, t.loop("i", 0, j + 1) as i:
-                a[j * n + i] = a[j * n + i] + t.element(kept, column(j) + i)
+                spot = j * n + i if square else column(j) + i
+                a[spot] = a[spot] + t.element(kept, column(j) + i)
 
         def add(i: int | Value, value: Value) -> None:
-            a[i * (n + 1)] = a[i * (n + 1)] + value
+            at = i * (n + 1) if square else packed(0, i) + i if isinstance(i, int) else column(i) + i
+            a[at] = a[at] + value
 
         put(t, add, {row: v for (row, col), v in sparse.items() if row == col})
         for (row, col), value in sparse.items():
             if row != col:
-                a[col * n + row] = a[col * n + row] + value
+                at = col * n + row if square else packed(row, col)
+                a[at] = a[at] + value
 
     def _kept(self, Q: Rows) -> str:
         """The field that holds all of Q, packed as P is; empty: none."""
@@ -122,7 +125,7 @@ class RolledFull(Full):
     def _standard(self, t: Trace, P: Entries, measurement: Measurement) -> tuple[Entries, Column, Value]:
         """P - g K s K^T, put off: one more term."""
         if len(P.terms) == PENDING:
-            P = self._written(P)
+            P = self.written(P)
         space, h, r, g = P.space, measurement.h, measurement.r, measurement.g
         number = len(P.terms)
         c = next_gain(space, f"c{number}", self.n, measurement.moved, self.steps)
@@ -182,7 +185,7 @@ class RolledFull(Full):
 
     def _joseph(self, t: Trace, P: Entries, measurement: Measurement) -> tuple[Entries, Column, Value]:
         """A = P - g K h P, then A - g (A h^T - r K) K^T, for any gain, in a copy of P."""
-        P = self._written(P)
+        P = self.written(P)
         n, space = self.n, P.space
         h, r, g = measurement.h, measurement.r, measurement.g
         seen = [i for i, x in enumerate(h) if not is_zero(x)]
@@ -221,8 +224,8 @@ class RolledFull(Full):
 
     def _not_negative(self, P: Entries, measurement: Measurement, gain: Column) -> Entries:
         """A variance that an exact measurement took to zero may come out below it by round-off: back to zero."""
-        c = P.terms[-1].c if self.form == "standard" else Array(P.space.t, "c0")
-        P = self._written(P)
+        c = P.terms[-1].c if self.form == "standard" else P.space.arrays["c0"]
+        P = self.written(P)
         t, array = P.space.t, Array(P.space.t, P.array)
         g = t.value(measurement.g)
         with t.loop("i", 0, self.n) as i:
@@ -245,6 +248,38 @@ class RolledFull(Full):
                     total = total + gain[i] * part
                 t.store(field, column(j) + i, total)
 
+    # sigma points -----------------------------------------------------------------------------------
+
+    def downdated(  # type: ignore[override]
+        self, t: Trace, P: Entries, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Entries
+    ) -> tuple[Entries, Value]:
+        """One more term; what rounding has left of a variance below zero is taken for zero."""
+        if len(P.terms) == PENDING:
+            P = self.written(P)
+        space, n = P.space, self.n
+        array = space.array(f"c{len(P.terms)}", n)
+        fill(t, array, c)
+        weight = t.name(t.value(1 / s), "weight")
+        P = replace(P, terms=(*P.terms, Term(array, weight)))
+        if sure:
+            return P, t.wrapped(t.pool.boolean(False))
+        P = self.written(P)
+        own, worst = Array(t, P.array), t.variable(t.unique("worst"), 0)
+        with t.loop("i", 0, n) as i:
+            place = column(i) + i
+            variance = t.name(own[place], "variance")
+            before = variance + array[i] * array[i] * weight
+            # the points' rounding is in c
+            worst.set(select(variance < -(before * (1024 * tolerance)), 1, worst.get()))
+            low = t.name(variance < 0, "negative")
+            t.flag(low, "REGULARIZED")
+            own[place] = select(low, 0, variance)
+        return P, worst.get() > 0
+
+    def placed(self, P: Entries) -> dict[str, Array]:
+        """Local arrays that hold P as the fields of the struct do."""
+        return {"kf.P": Array(P.space.t, self.written(P).array)}
+
     # the covariance ----------------------------------------------------------------------------------
 
     def entries(self, P: Entries) -> Symmetric:  # type: ignore[override]
@@ -262,7 +297,7 @@ class RolledFull(Full):
             total = linalg.minus(total, linalg.times(linalg.times(term.weight, term.c[i]), term.c[j]))
         return t.value(total)
 
-    def _written(self, P: Entries) -> Entries:
+    def written(self, P: Entries) -> Entries:
         """P in a packed array of the function's own, without terms."""
         if P.array and not P.terms and not P.square:
             return P
@@ -318,7 +353,7 @@ class RolledFull(Full):
         return super().tolerance(self.entries(P), h)
 
     def inflated(self, P: Entries, a: Number) -> Entries:  # type: ignore[override]
-        P = self._written(P)
+        P = self.written(P)
         array = Array(P.space.t, P.array)
         with P.space.t.loop("k", 0, self.n * (self.n + 1) // 2) as k:
             array[k] = array[k] * a
@@ -328,7 +363,7 @@ class RolledFull(Full):
         self, t: Trace, P: Entries, floors: list[Fraction | None], ceilings: list[Fraction | None]
     ) -> Entries:
         if not P.square:
-            P = self._written(P)
+            P = self.written(P)
         n, array = self.n, Array(t, P.array)
 
         def place(i: int | Value, j: int | Value) -> int | Value:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from kfgen.filters.kernels import carlson
+from kfgen.filters.kernels_points import remove_root
 from kfgen.filters.linalg import Measurement, Rows, Vector
-from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, integer, next_gain
+from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, fill, integer, next_gain
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, assume_nonnegative, constant_root, is_positive, select, sqrt
 from kfgen.filters.rolled_factors import Absorber
@@ -34,7 +35,7 @@ class RolledSqrt(Sqrt):
     rolled = True
 
     def __init__(
-        self, n: int, names: list[str], kernels: Kernels, weighted: bool, steps: bool, prefix: str
+        self, n: int, names: list[str], kernels: Kernels, weighted: bool, steps: bool, table: tuple[str, str]
     ) -> None:
         """As of RolledUD."""
         super().__init__(n)
@@ -42,7 +43,7 @@ class RolledSqrt(Sqrt):
         self.kernels = kernels
         self.weighted = weighted
         self.steps = steps
-        self.absorber = Absorber(names, kernels, prefix)
+        self.absorber = Absorber(names, kernels, table)
 
     @property
     def tables(self) -> Mapping[str, tuple[int, ...]]:  # type: ignore[override]
@@ -55,15 +56,16 @@ class RolledSqrt(Sqrt):
         """S_ij, i < j."""
         t = P.space.t
         if P.own:
-            return Array(t, "factor")[(triangle(j) if isinstance(j, Value) else packed(0, j)) + i]
-        return t.element("kf.S", self._spot(t, i, j))
+            return P.space.arrays["factor"][(triangle(j) if isinstance(j, Value) else packed(0, j)) + i]
+        return t.element("kf.S", self.spot(t, i, j))
 
     def _diagonal(self, P: Root, j: int | Value) -> Value:
         """S_jj."""
         t = P.space.t
-        return Array(t, "diagonal")[j] if P.own else t.element("kf.S", self._spot(t, j, j))
+        return P.space.arrays["diagonal"][j] if P.own else t.element("kf.S", self.spot(t, j, j))
 
-    def _spot(self, t: Trace, i: int | Value, j: int | Value) -> int | Value:
+    def spot(self, t: Trace, i: int | Value, j: int | Value) -> int | Value:
+        """Where S_ij stands in kf.S, i <= j."""
         if isinstance(i, int) and isinstance(j, int):
             return self.packed(i, j)
         return self._place(integer(t, i) if isinstance(i, int) else i, integer(t, j) if isinstance(j, int) else j)
@@ -83,7 +85,6 @@ class RolledSqrt(Sqrt):
     def predict(self, t: Trace, P: Root, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]  # type: ignore[override]
                 ) -> Root:  # fmt: skip
         """S S^T <- F S S^T F^T + Q + sum of d w w^T: U D U^T first, one root per state at the end."""
-        n = self.n
 
         def weight(k: int | Value) -> Value:
             if k == 0 and isinstance(k, int):  # its column is taken as a unit vector
@@ -96,14 +97,19 @@ class RolledSqrt(Sqrt):
                 entry(i, self._at(P, i, k))
 
         self.absorber.run(P.space, F, Q, noise, "F S S^T F^T + Q, two columns of F S after another", column_of, weight)
-        U, D = self.absorber.arrays(P.space)
         t.section("roots")
-        with t.loop("j", 0, n) as j:
-            root = t.name(sqrt(D[j]), "root")
+        self.take_roots(P.space)
+        return Root(P.space, own=True)
+
+    def take_roots(self, space: Space) -> None:
+        """From U D U^T in the arrays of the absorber to S S^T."""
+        t = space.t
+        U, D = self.absorber.arrays(space)
+        with t.loop("j", 0, self.n) as j:
+            root = t.name(sqrt(assume_nonnegative(D[j])), "root")
             D[j] = root
             with t.loop("i", 0, j) as i:
                 U[triangle(j) + i] = U[triangle(j) + i] * root
-        return Root(P.space, own=True)
 
     def update(self, t: Trace, P: Root, measurements: list[Measurement]  # type: ignore[override]
                ) -> tuple[Root, Rows, Vector]:  # fmt: skip
@@ -125,11 +131,43 @@ class RolledSqrt(Sqrt):
         t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *gain, (s.name, 0)])
         variance = t.name(s[0], "variance")
         if moves:
-            return P, [Displacement(space, n, Array(t, "moved"), [], s[1])], [variance]
+            return P, [Displacement(space, n, space.arrays["moved"], [], s[1])], [variance]
         return P, [Column(space, applied, n)], [variance]
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         self.absorber.learn(moved.space, field, rate, sure, moved.terms)
+
+    def downdated(  # type: ignore[override]
+        self, t: Trace, P: Root, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Root
+    ) -> tuple[Root, Value]:
+        n, space = self.n, P.space
+        if "small" not in space.arrays:
+            small = space.array("small", n)
+            with t.loop("j", 0, n) as j:
+                last = t.name(self._diagonal(prior, j), "last")
+                total = t.variable("total", last * last)
+                with t.loop("k", j + 1, n) as k:
+                    s_jk = t.name(self._at(prior, j, k), "s_jk")
+                    total.set(total.get() + s_jk * s_jk)
+                small[j] = total.get() * (tolerance * tolerance)
+        P = self._owned(P)
+        array, told = space.array("c", n), space.array("told", 2)
+        fill(t, array, c)
+        arrays: list[Given] = [(each.name, 0) for each in (*self.absorber.arrays(space), array, space.arrays["small"])]
+        t.call(remove_root(self.kernels, n), [*arrays, t.value(s), t.value(tolerance), (told.name, 0)])
+        t.flag(told[1] > 0, "REGULARIZED")
+        return P, told[0] > 0
+
+    def placed(self, P: Root) -> dict[str, Array]:
+        """A local array that holds P as the field of the struct does."""
+        P = self._owned(P)
+        t, n = P.space.t, self.n
+        S = P.space.array("S", n * (n + 1) // 2)
+        with t.loop("j", 0, n) as j:
+            with t.loop("i", 0, j) as i:
+                S[self.spot(t, i, j)] = self._at(P, i, j)
+            S[self.spot(t, j, j)] = self._diagonal(P, j)
+        return {"kf.S": S}
 
     # the covariance ----------------------------------------------------------------------------------
 
@@ -153,7 +191,7 @@ class RolledSqrt(Sqrt):
         first, _ = space.row(h)
         if first == n:
             return 0
-        array = Array(t, "h")
+        array = space.arrays["h"]
         total = t.variable(t.unique("total"), 0)
         with t.loop("j", first, n) as j:
             f = t.variable("f", array[j] * self._diagonal(P, j))

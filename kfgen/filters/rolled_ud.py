@@ -8,9 +8,21 @@ from fractions import Fraction
 
 from kfgen.filters import linalg
 from kfgen.filters.kernels import bierman
+from kfgen.filters.kernels_points import solve
 from kfgen.filters.layout import GainChange
 from kfgen.filters.linalg import Measurement, Rows, Vector
-from kfgen.filters.looped import Column, Displacement, Given, Kernels, Space, at_rest, changed_gain, integer, next_gain
+from kfgen.filters.looped import (
+    Column,
+    Displacement,
+    Given,
+    Kernels,
+    Space,
+    at_rest,
+    changed_gain,
+    fill,
+    integer,
+    next_gain,
+)
 from kfgen.filters.noise import Additive
 from kfgen.filters.numbers import Number, assume_nonnegative, is_positive, is_zero
 from kfgen.filters.rolled_factors import Absorber
@@ -28,10 +40,10 @@ class Factors:
     own: bool
 
     def u(self, place: int | Value) -> Value:
-        return Array(self.space.t, "factor")[place] if self.own else self.space.t.element("kf.U", place)
+        return self.space.arrays["factor"][place] if self.own else self.space.t.element("kf.U", place)
 
     def d(self, place: int | Value) -> Value:
-        found = Array(self.space.t, "diagonal")[place] if self.own else self.space.t.element("kf.D", place)
+        found = self.space.arrays["diagonal"][place] if self.own else self.space.t.element("kf.D", place)
         assume_nonnegative(found)
         return found
 
@@ -44,17 +56,17 @@ class RolledUD(UD):
 
     def __init__(
         self, order: list[int], update: str, change: GainChange | None, names: list[str], kernels: Kernels,
-        weighted: bool, steps: bool, prefix: str,
+        weighted: bool, steps: bool, table: tuple[str, str],
     ) -> None:  # fmt: skip
         """names: of the states in the inner order. weighted: whether measurements may have a weight. steps:
-        whether what each measurement moves the state by is asked for. prefix: the filter's name."""
+        whether what each measurement moves the state by is asked for. table: as of Absorber."""
         super().__init__(order, update, change)
         self.group = 1
         self.names = names
         self.kernels = kernels
         self.weighted = weighted
         self.steps = steps
-        self.absorber = Absorber(names, kernels, prefix)
+        self.absorber = Absorber(names, kernels, table)
 
     @property
     def tables(self) -> Mapping[str, tuple[int, ...]]:  # type: ignore[override]
@@ -121,7 +133,7 @@ class RolledUD(UD):
         t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *gain, (s.name, 0)])
         variance = t.name(s[0], "variance")
         if moves:
-            return P, [Displacement(space, n, Array(t, "moved"), [], s[1])], [variance]
+            return P, [Displacement(space, n, space.arrays["moved"], [], s[1])], [variance]
         if self.change is not None:
             t.section("the gain that is applied differs from K by w: + s w w^T")
             w = self.absorber.columns(space)
@@ -132,6 +144,28 @@ class RolledUD(UD):
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         self.absorber.learn(moved.space, field, rate, sure, moved.terms)
+
+    def downdated(  # type: ignore[override]
+        self, t: Trace, P: Factors, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Factors
+    ) -> tuple[Factors, Value]:
+        P = self._owned(P)
+        array = P.space.array("c", self.n)
+        fill(t, array, c)
+        known = None if sure else tolerance
+        # the points' rounding is in c
+        return P, self.absorber.remove(P.space, array, t.value(s), 1024 * tolerance, known)
+
+    def solved(self, t: Trace, name: str, c: Vector, tolerance: Fraction) -> Vector:
+        """P^-1 c of the struct's P, in a local array."""
+        array = t.array(name, self.n)
+        fill(t, array, c)
+        t.call(solve(self.kernels, self.n), [("kf.U", 0), ("kf.D", 0), (array.name, 0), t.value(tolerance)])
+        return [array[i] for i in range(self.n)]
+
+    def placed(self, P: Factors) -> dict[str, Array]:
+        """Local arrays that hold P as the fields of the struct do."""
+        U, D = self.absorber.arrays(self._owned(P).space)
+        return {"kf.U": U, "kf.D": D}
 
     # the covariance ----------------------------------------------------------------------------------
 
@@ -156,7 +190,7 @@ class RolledUD(UD):
         first, _ = space.row(h)
         if first == n:
             return 0
-        array = Array(t, "h")
+        array = space.arrays["h"]
         total = t.variable(t.unique("total"), 0)
         with t.loop("j", first, n) as j:
             f = t.variable("f", array[j])
@@ -168,7 +202,7 @@ class RolledUD(UD):
 
     def inflated(self, P: Factors, a: Number) -> Factors:  # type: ignore[override]
         P = self._owned(P)
-        t, D = P.space.t, Array(P.space.t, "diagonal")
+        t, D = P.space.t, P.space.arrays["diagonal"]
         with t.loop("i", 0, self.n) as i:
             D[i] = D[i] * t.value(a)
         return P
@@ -177,7 +211,7 @@ class RolledUD(UD):
         self, t: Trace, P: Factors, floors: list[Fraction | None], ceilings: list[Fraction | None]
     ) -> Factors:
         P = self._owned(P)
-        array = Array(t, "diagonal")
+        array = P.space.arrays["diagonal"]
         D: Vector = [t.name(array[j], f"d_{name}") for j, name in enumerate(self.names)]
         limited = super().limit(t, ([], list(D)), floors, ceilings)[1]
         for j, (new, old) in enumerate(zip(limited, D, strict=True)):

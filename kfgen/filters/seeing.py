@@ -20,6 +20,7 @@ from kfgen.filters.numbers import (
     select,
 )  # fmt: skip
 from kfgen.filters.points import PointSet
+from kfgen.filters.rolled_ud import RolledUD
 from kfgen.filters.sensor import Linearised, SensorCode, total
 from kfgen.filters.symmetric import Symmetric
 from kfgen.ir.program import Argument, Function
@@ -264,12 +265,21 @@ class Seeing:
         """H = Pxz^T P^-1, with R as it is; and the spread of the points (sequential filters: U D U^T)."""
         t = u.t
         seen = self.read(t, self.look(ukf, u)[0])
+        if isinstance(u.layout, RolledUD):
+            H = [u.layout.solved(t, f"h_{a}", [seen.cross[i][a] for i in range(self.n)], self.tolerance)
+                 for a in range(self.m)]  # fmt: skip
+            return self._regressed(u, seen, H), seen.spread
         U, D = u.P
         H = []
         dense = u.layout.entries(u.P)
         known = [dense[j, j] * self.tolerance for j in range(self.n)]  # a pivot up to it is a direction without spread
         for a in range(self.m):
             H.append(_solved(U, D, [seen.cross[i][a] for i in range(self.n)], known))
+        return self._regressed(u, seen, H), seen.spread
+
+    def _regressed(self, u: Update, seen: Seen, H: Rows) -> Linearised:
+        """With R, and what the carried noises add to it."""
+        t = u.t
         linear = replace(u.code.linearise(u.x), y=u.code.residuals(u.x, seen.z), H=H)
         if self.carried:
             if u.used is None and any(r.constant is None for row in total(linear) for r in row):
@@ -281,7 +291,7 @@ class Seeing:
                      for a in range(self.m)]  # fmt: skip
             added = [[p + q for p, q in zip(r, s, strict=True)] for r, s in zip(linear.added, share, strict=True)]
             linear = replace(linear, added=added, computed=True)
-        return linear, seen.spread
+        return linear
 
 
 def _solved(U: Rows, D: Vector, c: Vector, smallest: Vector) -> Vector:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
+from typing import cast
 
 from kfgen.filters import cloud, guards, process, rolled
 from kfgen.filters.base import KF, Block
@@ -16,13 +17,15 @@ from kfgen.filters.cloud import Private
 from kfgen.filters.dual import Dual, Evaluator
 from kfgen.filters.ekf import Ekf, Learnt, Update
 from kfgen.filters.gather import Gatherer, gatherer, noise_root
-from kfgen.filters.layout import Covariance, Layout
+from kfgen.filters.layout import Covariance, Layout, Rolled
 from kfgen.filters.linalg import Rows, Vector
 from kfgen.filters.noise import Given
 from kfgen.filters.numbers import is_zero
 from kfgen.filters.phases import Made, Phases
 from kfgen.filters.points import PointSet, point_set
 from kfgen.filters.process import Step
+from kfgen.filters.rolled_full import RolledFull
+from kfgen.filters.rolled_points import Gathered, definite, gathered, scatter
 from kfgen.filters.seeing import Seeing
 from kfgen.filters.sensor import Linearised
 from kfgen.filters.symmetric import Symmetric
@@ -120,10 +123,13 @@ class Ukf(Ekf):
 
     def predicting(self, t: Trace, step: Step) -> Phases:
         """Points through f; x <- their mean, P <- their spread + Q + G Qw G^T of the noises that they do not carry."""
-        if self.simple:
+        if self.simple or self.plain.rolled:
             with self._without_points():
-                yield from super().predicting(t, step)
-            return
+                yield from super().predicting(t, step) if self.simple else self._predicting(t, step)
+        else:
+            yield from self._predicting(t, step)
+
+    def _predicting(self, t: Trace, step: Step) -> Phases:
         model = self.model
         prior = process.given(t, model, step)
         result = process.advance(t, model, prior, step, carried=self.carried)
@@ -148,6 +154,8 @@ class Ukf(Ekf):
         guards.doubts(t, [*x, *doubtful, *tested])
         guards.finite(t, [*x, *evidence, *tested])
         guards.positive(t, failures)
+        if isinstance(self.layout, RolledFull) and not self.set.positive:
+            P = definite(self.layout, P, self.n * self.scalar.epsilon)
         yield Made(x, P)
         self.store(t, x, set(range(self.n)), P, after_predict=True)
         if self.keeps:
@@ -155,10 +163,9 @@ class Ukf(Ekf):
 
     @property
     def loops(self) -> bool:
-        """Whether loops do what grows with the square of the states."""
-        unroll = self.model.spec.code.unroll
-        many = unroll == "none" or (self.n >= rolled.FROM and unroll != "full")
-        return many and not self.own and self.set.extra >= 0
+        """Whether loops do what grows with the square of the states: all of it, or what then pays."""
+        many = self.n >= rolled.FROM and self.model.spec.code.unroll != "full"
+        return self.plain.rolled or (many and not self.own and self.set.extra >= 0)
 
     @property
     def predicts_in_loops(self) -> bool:
@@ -168,8 +175,13 @@ class Ukf(Ekf):
         self, t: Trace, P: Covariance, noise: Rows, points: PointSet, array: Array, stored: bool = True
     ) -> list[Value]:
         """Write points of P into the array; conditions of failure. stored: P is that of the struct."""
-        if self.loops and stored:
-            rolled.scatter(t, array, points, rolled.root(t, self.layout, self.tolerance), self.n, noise)
+        if self.loops and (stored or self.layout.rolled):
+            own = None if stored else cast(Rolled, self.layout).placed(P)
+            root = rolled.root(t, self.layout, self.tolerance, own)
+            if self.own:
+                scatter(t, array, points, root, self.n)
+            else:
+                rolled.scatter(t, array, points, root, self.n, noise)
             return []
         columns, failures = self.root(t, P, noise)
         cloud.fill(t, array, points, columns)
@@ -217,8 +229,10 @@ class Ukf(Ekf):
         Q = Given([[result.Q[i][j] for j in self.order] for i in self.order])
         noise = [([w[i] for i in self.order], d) for w, d in result.noise]
         common = points.wc[0] if points.uniform else None
-        gather: Gatherer | rolled.Entries | rolled.Factors
-        if self.loops:
+        gather: Gatherer | rolled.Entries | rolled.Factors | Gathered
+        if self.layout.rolled:
+            gather = gathered(t, self.layout, Q, noise, common, self.absorb, self.scalar.epsilon)
+        elif self.loops:
             assert common is not None
             if self.absorb is None:
                 gather = rolled.Entries(t, self.layout, Q, noise, common)
@@ -246,7 +260,9 @@ class Ukf(Ekf):
             weight = cloud.weights(t, points.wm, k, "wm")
             for variable, d in zip(sums, deviations, strict=True):
                 variable.set(variable.get() + (d if points.uniform else weight * d))
-            if points.theta == 0 and isinstance(gather, rolled.Entries | rolled.Factors):
+            if points.theta == 0 and isinstance(gather, Gathered):
+                gather.add_row(array, at, common or cloud.weights(t, points.wc, k, "wc"))
+            elif points.theta == 0 and isinstance(gather, rolled.Entries | rolled.Factors):
                 gather.add_row(array, at)
             elif points.theta == 0:
                 gather.add([deviations[i] for i in self.order], common or cloud.weights(t, points.wc, k, "wc"))
@@ -264,8 +280,8 @@ class Ukf(Ekf):
         return [b + s for b, s in zip(base, shift, strict=True)], P, failures, shift
 
     def _about_mean(
-        self, t: Trace, gather: Gatherer | rolled.Entries | rolled.Factors, array: Array, stride: int, inner: Vector,
-        common: Fraction | None,
+        self, t: Trace, gather: Gatherer | rolled.Entries | rolled.Factors | Gathered, array: Array, stride: int,
+        inner: Vector, common: Fraction | None,
     ) -> None:
         """Gather deviations less the mean's shift; those of negative weight last."""
         points = self.set
@@ -275,13 +291,18 @@ class Ukf(Ekf):
                 continue
             with t.loop("k", start, stop) as k:
                 at = k * stride
-                if isinstance(gather, rolled.Entries | rolled.Factors):
+                weight = common or cloud.weights(t, points.wc, k, "wc")
+                if isinstance(gather, rolled.Entries | rolled.Factors | Gathered):
                     for i, s in zip(self.order, inner, strict=True):
                         array[at + i] = array[at + i] - s
-                    gather.add_row(array, at)
+                    if not isinstance(gather, Gathered):
+                        gather.add_row(array, at)
+                    elif start == 0:
+                        gather.add_row(array, at, weight)
+                    else:
+                        gather.subtract_row(array, at, -weight)
                     continue
                 d = [array[at + i] - s for i, s in zip(self.order, inner, strict=True)]
-                weight = common or cloud.weights(t, points.wc, k, "wc")
                 if start == 0:
                     gather.add(d, weight)
                 else:
@@ -318,8 +339,10 @@ class Ukf(Ekf):
             if first:
                 t.store("kf.points", i, -s)
         with t.loop("k", 0, len(self.set.rows)) as k:
-            for i, s in enumerate(offset):
-                t.store("kf.points", k * self.n + (i + first), array[k * (self.n + len(self.carried)) + i] - s)
+            for i, (s, mean) in enumerate(zip(offset, shift, strict=True)):
+                done = mean if self.loops and self.set.theta else t.zero  # what it is less already
+                d = array[k * (self.n + len(self.carried)) + i] - (s - done)
+                t.store("kf.points", k * self.n + (i + first), d)
         limited = t.wrapped(t.pool.boolean(False))
         for condition in limits:
             limited = limited | condition
@@ -332,9 +355,12 @@ class Ukf(Ekf):
         chosen = self.model.spec.filter
         several = len(sensor.h) > 1 and self.model.options.innovation_floor is not None
         whole = not chosen.sequential and (chosen.adaptive is not None or several)
-        if seeing.linear and not whole:
+        if self.plain.rolled or (seeing.linear and not whole):
             with self._without_points():
-                yield from super().updating(t, sensor, used)
+                if chosen.sequential or (seeing.linear and not whole):
+                    yield from super().updating(t, sensor, used)
+                else:
+                    yield from whole_vector(self, seeing, t, sensor, used)
         elif chosen.sequential:
             yield from super().updating(t, sensor, used)
         else:

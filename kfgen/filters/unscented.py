@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from kfgen.filters import guards, linalg
 from kfgen.filters.ekf import Update
@@ -28,6 +28,8 @@ from kfgen.filters.numbers import (
     sqrt,
 )  # fmt: skip
 from kfgen.filters.phases import Judged, Made, Phases
+from kfgen.filters.rolled_full import RolledFull
+from kfgen.filters.rolled_points import definite
 from kfgen.filters.seeing import Seeing, Seen
 from kfgen.filters.sensor import Linearised, SensorCode, decorrelated
 from kfgen.filters.sequence import Updated
@@ -147,9 +149,12 @@ def whole_vector(
     x = ukf.state.confined(t, x)
     t.section("guards")
     guards.finite(t, [nis, *x, *evidence])
-    if not layout.factored and not work.definite:
+    rolled = layout.rolled and not layout.factored
+    if not layout.factored and not rolled and not work.definite:
         failed += indefinite(P, ukf.n * ukf.scalar.epsilon)
     guards.positive(t, failed)
+    if rolled and not work.definite:
+        P = definite(cast(RolledFull, layout), P, ukf.n * ukf.scalar.epsilon)
     log_likelihood = likelihood * Fraction(-1, 2)
     learnt = ukf.prepared(u, x, P, Updated(moved, P, nis, list(final.D), [], log_likelihood, []))
     yield Made(x, P, nis, log_likelihood)

@@ -22,6 +22,7 @@ class Fixed:
     silent_ops = frozenset({"q_abs", "q_min", "q_max", "q_sign", "q_count", "q_fma"}) | {
         f"q_{name}" for name in WITHOUT_STATUS
     }
+    uniform = False
     c_type = "int32_t"
     size = 4
     epsilon = Fraction(1, 2**26)

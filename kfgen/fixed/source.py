@@ -212,6 +212,8 @@ class Source:
             return self.new(f"segment({args[0]}, {self.program.table(node.data)}_x)")
         if node.op == "half":
             return f"({args[0]} // 2)"
+        if node.op == "neg":
+            return f"(-{args[0]})"
         return f"({args[0]} { {'add': '+', 'sub': '-', 'mul': '*'}[node.op]} {args[1]})"
 
     def shortcut(self, node: Node) -> str:

@@ -166,6 +166,8 @@ def fold(op: str, args: tuple[Node, ...], kind: str) -> Node | None:
     a = int(known[0] or 0)
     if op == "half":
         return integer(a // 2)
+    if op == "neg":
+        return integer(-a)
     if len(known) != 2:
         return None
     b = int(known[1] or 0)

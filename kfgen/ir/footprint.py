@@ -18,7 +18,7 @@ from kfgen.ir.nodes import BOOL, INT, Node
 from kfgen.ir.program import Assign, Call, Declare, Flag, For, Function, Guard, If, Let, Statement, Store, roots, walk
 
 REGISTERS = 24  # that hold numbers, of 32: the others are needed to compute
-LIBRARY = {"float": 40, "double": 96}  # bytes of stack that newlib's functions take, and those of soft double
+LIBRARY = {"float": 40, "double": 96, "q": 40}  # bytes of stack of newlib's functions, of soft double's, of ours
 CROWDED = 100  # numbers beyond the registers, from which on the flags were measured to pay
 KEPT = 14  # of these, those that outlast a call
 _CALLS = {"sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "pow", "floor"}
@@ -163,8 +163,18 @@ def _bytes(found: Traits, table: Mapping[str, float]) -> float:
 
 def predicted(functions: Iterable[Function], scalar: str = "float") -> int:
     """Bytes of code of these functions, together."""
-    table = sizes.FLASH.get(scalar, sizes.FLASH["float"])
+    table = sizes.FLASH[_family(scalar)]
     return round(sum(max(_bytes(traits(function), table), 8.0) for function in functions))
+
+
+def _family(scalar: str) -> str:
+    """The row of a table: all fixed-point types share one."""
+    return scalar if scalar in sizes.FLASH else "q"
+
+
+def predicted_routines(routines: Iterable[str]) -> int:
+    """Bytes of the routines of fixed point that a filter's file holds."""
+    return round(sum(sizes.ROUTINES.get(routine, 0) for routine in routines))
 
 
 def stack_traits(found: Traits) -> list[float]:
@@ -177,11 +187,12 @@ def stack_traits(found: Traits) -> list[float]:
 def predicted_stack(function: Function, scalar: str = "float") -> int:
     """Bytes of stack of a function, with the functions that it calls: the filter's own and the libraries'."""
     found = traits(function)
-    table = sizes.STACK.get(scalar, sizes.STACK["float"])
+    family = _family(scalar)
+    table = sizes.STACK[family]
     own = sum(size * each for size, each in zip(table.values(), stack_traits(found), strict=True))
-    own += sizes.WIDTH.get(scalar, 4) * found.arrays
+    own += sizes.WIDTH[family] * found.arrays
     called = {id(s.callee): s.callee for s in walk(function.body) if isinstance(s, Call)}
     below = [predicted_stack(each, scalar) for each in called.values()]
-    if found.counts["library"] or scalar == "double":
-        below.append(LIBRARY.get(scalar, 0))
+    if found.counts["library"] or family != "float":
+        below.append(LIBRARY[family])
     return round(own + max(below, default=0))

@@ -16,6 +16,7 @@ class Scalar(Protocol):
     name: str
     c_type: str
     size: int  # bytes
+    uniform: bool  # whether all elements of an array have one format, so that loops can go through them
     helpers: str
     helper_ops: frozenset[str]
     silent_ops: frozenset[str]  # routines of a fixed-point type that cannot saturate

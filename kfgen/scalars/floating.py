@@ -18,6 +18,7 @@ class Floating:
     helpers = "helpers_float.j2"
     helper_ops = frozenset({"finite", "wrap", "segment", "min", "max", "sign"})
     silent_ops: frozenset[str] = frozenset()
+    uniform = True
 
     def __init__(self, name: str, dtype: type[np.floating[Any]], suffix: str) -> None:
         self.name = self.c_type = name

@@ -243,7 +243,8 @@ CODE = Record(
         Key(
             "unroll",
             Choice(("auto", "full", "none")),
-            "`none`: loops over static arrays; `auto`: loops where straight-line code would exceed `flash`.",
+            "`none`: loops over static arrays; `auto`: loops where straight-line code would exceed `flash`. In fixed "
+            "point all are one: an element of a covariance has a binary point of its own, which a loop could not have.",
             "auto",
         ),
         Key(

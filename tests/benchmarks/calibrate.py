@@ -1,8 +1,9 @@
 """`python -m tests.benchmarks.calibrate`: fit the bytes of kfgen/ir/sizes.py to what arm-none-eabi-gcc makes.
 
-Every spec of the repository and the problems of the tests are generated in all forms of the covariance, as float and
-double, and compiled for a Cortex-M4F; each emitted function is one equation for the flash, and one for the stack.
-The coefficients are the non-negative ones of least relative error. Prints the errors; writes the table.
+Every spec of the repository and the problems of the tests are generated in all forms of the covariance, written out and
+in loops, as float, double and fixed point, and compiled for a Cortex-M4F; each emitted function is one equation for the
+flash, and one for the stack; the routines of a fixed-point filter are one for the flash of what it calls. The
+coefficients are the non-negative ones of least relative error. Prints the errors; writes the table.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -35,36 +37,46 @@ FORMS = [
     {"covariance": "full", "update": "joseph"}, {"covariance": "full", "update": "standard"}, {"covariance": "sqrt"},
 ]  # fmt: skip
 UNSCENTED = ("covariance: ud", "covariance: full", "covariance: sqrt", "covariance: ud, sequential: true")
-SCALARS = ("float", "double")
+SCALARS = {"float": "float", "double": "double", "q": "q16.16"}
+SMALL = ("cv4", "vehicle4", "chain4", "radar", "ball")  # problems that are compiled in all scalars
 STACK_COLUMNS = ("base", "live", "beyond", "kept", "calls", "loop")
-WIDTH = {"float": 4, "double": 8}
+WIDTH = {"float": 4, "double": 8, "q": 4}
 Row = tuple[str, str, Traits, int, int]  # scalar, label, what it is made of, bytes of flash, bytes of stack
+Job = tuple[str, str, str, dict[str, str], str]  # label, a spec's text, scalar, changes of the filter, unroll
 
 
-def filters() -> Iterator[tuple[str, str, str, dict[str, str]]]:
+def filters() -> Iterator[Job]:
+    for label, text, scalar, form in forms():
+        yield label, text, scalar, form, "auto"
+        if scalar != "q":
+            yield f"{label} in loops", text, scalar, form, "none"
+
+
+def forms() -> Iterator[tuple[str, str, str, dict[str, str]]]:
     """Label, a spec's text, scalar, changes of the filter."""
     texts = {path.stem: path.read_text() for path in sorted((ROOT / "specs").glob("*.yaml"))}
     texts |= {name: problems.ALL[name] for name in ("cv4", "vehicle4", "chain4", "chain8", "radar", "ball", "att")}
     texts["chain12"], texts["chain16"] = problems.chain(12), problems.chain(16)
     for name, text in texts.items():
         for scalar in SCALARS:
-            if scalar == "double" and name in ("chain12", "chain16", "att"):
+            if scalar != "float" and name in problems.ALL | {"chain12": "", "chain16": ""} and name not in SMALL:
                 continue
             yield name, text, scalar, {}
             if "type: ukf" in text:
                 continue
             for form in FORMS:
                 yield f"{name} {form}", text, scalar, form
-            if name in ("vehicle4", "chain4", "chain8", "chain12", "radar"):
+            if scalar != "q" and name in ("vehicle4", "chain4", "chain8", "chain12", "radar"):
                 for form in UNSCENTED:
                     yield f"{name} ukf {form}", text.replace("type: ekf", f"type: ukf, {form}"), scalar, {}
 
 
-def rows(job: tuple[str, str, str, dict[str, str]]) -> list[Row]:
+def rows(job: Job) -> list[Row]:
     """The functions of a filter, compiled. A function that calls private ones is taken together with them."""
-    label, text, scalar, form = job
+    label, text, scalar, form, unroll = job
     try:
-        spec = override(loads(text), scalar, **({"filter": form} if form else {}))
+        spec = override(loads(text), SCALARS[scalar], **({"filter": form} if form else {}))
+        spec = replace(spec, code=replace(spec.code, unroll=unroll))
         generated = build(spec, judge=False)
     except SpecError:
         return []  # a form that this filter cannot have
@@ -87,6 +99,10 @@ def rows(job: tuple[str, str, str, dict[str, str]]) -> list[Row]:
                 whole.arrays += part.arrays
                 whole.live = max(whole.live, part.live)
         out.append((scalar, f"{label} {function.name}", whole, size, depth))
+    routines = generated.view.routines
+    if routines is not None:
+        size = sum(flash[name] for name in flash if name.startswith(f"{spec.name}_q_"))
+        out.append(("routines", label, Traits(Counter((*routines.ops, *routines.own))), size, 0))
     return out
 
 
@@ -109,7 +125,7 @@ def compiled(name: str, files: dict[str, str], flags: list[str]) -> tuple[Counte
         )
         usage = Path(folder, f"{name}.su").read_text()
     flash: Counter[str] = Counter()
-    for section, size in re.findall(r"^\.text\.(\S+)\s+(\d+)", listed.stdout, re.MULTILINE):
+    for section, size in re.findall(r"^\.(?:text|rodata)\.(\S+)\s+(\d+)", listed.stdout, re.MULTILINE):
         flash[section.removeprefix("unlikely.").partition(".")[0]] += int(size)
     stack = {function: int(size) for function, size in re.findall(r":(\w+)\t(\d+)\t", usage)}
     return flash, stack
@@ -129,8 +145,11 @@ def main() -> int:
     return 0
 
 
-def fit(found: list[Row]) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
-    """The tables of flash and of stack."""
+Tables = dict[str, dict[str, float]]
+
+
+def fit(found: list[Row]) -> tuple[Tables, Tables, dict[str, float]]:
+    """The tables of flash, of stack, and of the flash of routines."""
     flash: dict[str, dict[str, float]] = {}
     stack: dict[str, dict[str, float]] = {}
     for scalar in SCALARS:
@@ -146,7 +165,12 @@ def fit(found: list[Row]) -> tuple[dict[str, dict[str, float]], dict[str, dict[s
         x, errors = fitted(S, y, 64)
         stack[scalar] = {kind: round(float(each), 2) for kind, each in zip(STACK_COLUMNS, x, strict=True)}
         tell(f"{scalar} stack", steps, errors)
-    return flash, stack
+    mine = [row for row in found if row[0] == "routines"]
+    kinds = sorted({kind for row in mine for kind in row[2].counts})
+    A = np.array([[row[2].counts[kind] for kind in kinds] for row in mine], float)
+    x, errors = fitted(A, np.array([row[3] for row in mine], float), 256)
+    tell("routines", mine, errors)
+    return flash, stack, {kind: round(float(each), 2) for kind, each in zip(kinds, x, strict=True)}
 
 
 def tell(title: str, mine: list[Row], errors: np.ndarray) -> None:
@@ -156,7 +180,7 @@ def tell(title: str, mine: list[Row], errors: np.ndarray) -> None:
         print(f"  {errors[i]:+.0%}  {mine[i][1]}: flash {mine[i][3]}, stack {mine[i][4]}")
 
 
-def write(flash: dict[str, dict[str, float]], stack: dict[str, dict[str, float]]) -> None:
+def write(flash: Tables, stack: Tables, routines: dict[str, float]) -> None:
     """kfgen/ir/sizes.py."""
     lines = [
         '"""Bytes on a Cortex-M4F, by scalar and kind; written by `python -m tests.benchmarks.calibrate`."""',
@@ -170,6 +194,7 @@ def write(flash: dict[str, dict[str, float]], stack: dict[str, dict[str, float]]
         for scalar, row in table.items():
             lines += [f'    "{scalar}": {{', *(f'        "{kind}": {size},' for kind, size in row.items()), "    },"]
         lines.append("}")
+    lines += ["", "ROUTINES: Mapping[str, float] = {", *(f'    "{op}": {size},' for op, size in routines.items()), "}"]
     lines += ["", f"WIDTH: Mapping[str, int] = {WIDTH}".replace("'", '"'), ""]
     (ROOT / "kfgen/ir/sizes.py").write_text("\n".join(lines))
 

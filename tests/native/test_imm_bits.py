@@ -41,6 +41,7 @@ measurements:
 """
 COURSE = "  course: {z: {w: {h: w + x/8, std: 0.1, kind: {periodic: 5}}}}\n"
 CODE = "code: {gate_count: true}\n"
+LOOPS = "code: {gate_count: true, unroll: none}\n"
 DYNAMICS = [
     "noise: {n: {std: 0.25}}\ndynamics: {f: {x: x + dt*y, y: y - dt*x/4 + dt*(push + n), w: w + dt*(1 + x*y/16)}, "
     "Q: {x: 0.01, y: 0.02, w: 0.01}}",
@@ -59,6 +60,11 @@ CASES = {
         ["type: ekf, covariance: sqrt", "type: ekf2, adapt_R: 0.05, adapt_Q: 0.02",
          "type: ukf, sequential: true, robust: chernodarov"],
         [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.25, 0.25, 0.5]],
+    ),
+    "loops": (
+        TOP,
+        ["type: ekf", "type: ekf, adaptive: {chi2: 1}", "type: iekf, update: joseph, consider: [w]"],
+        [[0.75, 0.125, 0.125], [0.25, 0.5, 0.25], [0, 0.5, 0.5]],
     ),
     "kept": (
         TOP + "initialize: {from: fix, states: {x: a}}\n",
@@ -108,7 +114,8 @@ def test_c_is_the_program(scalar):
     for name in CASES if scalar == "float" else ("learning",):
         top, filters, transition = CASES[name]
         modes = {f"m{k}": f"{DYNAMICS[k]}\nfilter: {{{each}}}" for k, each in enumerate(filters)}
-        text = bank(top + CODE, modes, transition, mu_floor=0 if name == "learning" else 1e-9)
+        code = LOOPS if name == "loops" else CODE
+        text = bank(top + code, modes, transition, mu_floor=0 if name == "learning" else 1e-9)
         spec = replace(override(loads(text), scalar), name=f"bits_{name}")
         made[name] = spec, build(spec)
     filters = load_filters([(spec, each.files) for spec, each in made.values()], flags=["-O0", "-ffp-contract=off"])

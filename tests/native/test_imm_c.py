@@ -105,19 +105,47 @@ MIXTURES = {
 }  # fmt: skip
 
 
-def mixture(key: str) -> str:
-    filters, transition, mu0, top, second = MIXTURES[key]
+def mixture(case: tuple[list[str], list[list[float]], list[float], str, str]) -> str:
+    filters, transition, mu0, top, second = case
     modes = {
         f"m{k}": f"{DYNAMICS[k]}\nfilter: {{{options}}}\n{second if k == 1 else ''}"
         for k, options in enumerate(filters)
     }
-    floor = {"mu_floor": 0} if key in ("points", "curved") else {}
+    floor = {"mu_floor": 0} if 0 in mu0 else {}
     return bank(TOP + top + CODE, modes, transition, mu0=mu0, **floor)
 
 
+# filters of the modes that are all kept alike, so that they are mixed in loops; the rest as of MIXTURES
+ALIKE = {
+    "ud": (
+        ["type: ekf", "type: iekf, iterations: 2", "type: ekf2, adaptive: true"],
+        [[0.9, 0.05, 0.05], [0.05, 0.9, 0.05], [0.1, 0.1, 0.8]], [0.2, 0.3, 0.5], SETS, START,
+    ),
+    "full": (
+        ["type: ekf, covariance: full, update: standard", "type: ukf, covariance: full",
+         "type: ekf, covariance: full, update: joseph, robust: huber"],
+        [[0, 0.5, 0.5], [0, 1, 0], [0, 0.5, 0.5]], [0.5, 0, 0.5], "", SENSORS,
+    ),
+    "sqrt": (
+        ["type: ekf, covariance: sqrt", "type: ukf, covariance: sqrt", "type: iekf, covariance: sqrt, iterations: 2",
+         "type: ekf, covariance: sqrt, variance_floor: 0.01"],
+        [[0.5, 0.5, 0, 0], [0, 0.5, 0.5, 0], [0, 0, 0.5, 0.5], [0.5, 0, 0, 0.5]], [0, 0, 1, 0], "", OPEN,
+    ),
+    "learning": (
+        ["type: ukf", "type: ekf, adapt_R: 0.01, adapt_Q: 0.01",
+         "type: ekf, update: joseph, gain_limit: 0.4, robust: chernodarov"],
+        [[0, 1, 0], [0, 0, 1], [1, 0, 0]], [0.3, 0.3, 0.4], "", "P0: [[1, 0.5, 0], [0.5, 1, 0.1], [0, 0.1, 0.3]]",
+    ),
+}  # fmt: skip
+LOOPS = {f"{key} alike": mixture(case) for key, case in ALIKE.items()}
+LOOPS |= {key: mixture(MIXTURES[key]) for key in ("layouts", "limited")}
+LOOPS = {key: text.replace("code: {", "code: {unroll: none, ") for key, text in LOOPS.items()}
+
+
 def test_mixtures():
+    """Written out, and in loops."""
     seen = Status.OK
-    for key, pair in pairs({key: mixture(key) for key in MIXTURES}).items():
+    for key, pair in pairs({key: mixture(case) for key, case in MIXTURES.items()} | LOOPS).items():
         pair.drive(20, 3)
         assert pair.worst < 1e-8, key
         seen |= pair.seen

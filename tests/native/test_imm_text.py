@@ -112,6 +112,7 @@ measurements:
     return [
         loads(bank(HOSTILE, MODES, uniform(5))), loads(bank(STARS, stars, uniform(2))),
         loads(bank(longer, modes, uniform(3))),
+        loads(bank(HOSTILE.replace("name: ", "name: looped_", 1) + "code: {unroll: none}\n", MODES, uniform(5))),
     ]  # fmt: skip
 
 

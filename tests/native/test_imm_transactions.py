@@ -43,6 +43,9 @@ FILTERS = [
 ]  # fmt: skip
 
 
+IN_LOOPS = ["type: ekf", "type: iekf, variance_ceiling: 9", "type: ekf, adaptive: true"]
+
+
 def breakable(gate: str, filters: list[str]) -> str:
     names = ", ".join(f"{name}{i}: {value}" for i in range(3) for name, value in GOOD.items())
     modes = {}
@@ -65,6 +68,7 @@ CALLS: list[tuple[str, Any]] = [("predict", ()), ("update", ("s", [3.0, 0.3])), 
 
 def test_an_error_in_any_mode_at_any_stage():
     specs = [loads(breakable(*each)) for each in FILTERS]
+    specs.append(loads(breakable(GATE, IN_LOOPS).replace("kfgen: 1", "kfgen: 1\ncode: {unroll: none}")))
     met = set()
     for spec, kf in zip(specs, compile_many(specs, "double", flags=["-O0"]), strict=True):
         ref, random = reference(spec), np.random.default_rng(0)
@@ -109,6 +113,11 @@ def _filters() -> list[NativeFilter]:
             TOP.replace("dt: {nominal: 0.1, min: 0.05, max: 0.15}", "dt: {nominal: 0.1}") + code,
             {"a": every["m1"], "b": f"{every['m0']}\n{OPEN}"},
             [[0, 1], [1, 0]], mu0=[1, 0], mu_floor=0,
+        ),
+        bank(
+            TOP + code.replace("code: {", "code: {unroll: none, "),
+            {name: every[name].replace(each, MIXED[0]) for name, each in zip(("m0", "m1"), MIXED, strict=False)},
+            [[0.5, 0.5], [0.5, 0.5]],
         ),
     ]  # fmt: skip
     return compile_many([loads(text) for text in texts], "float", flags=["-O0"])
@@ -205,7 +214,7 @@ def test_a_gated_update():
             kf._kf.nis = good._kf.nis
             setattr(kf._kf, count, getattr(good._kf, count))
             assert bytes(kf) == bytes(good)
-    assert len(gated) == 2  # one mode of the second bank takes every place
+    assert len(gated) == 4  # one mode of the second bank takes every place
 
 
 GATES = """
