@@ -255,7 +255,7 @@ class _ViewMaker:
         if self.fixed is None:
             return None
         used = {op.removeprefix("q_") for op in self.helpers if op.startswith("q_")}
-        used |= {"asr", "product", "round"} if used & {"fma", "mac"} else set()
+        used |= {"asr", "moved", "product", "round"} if used & {"fma", "mac"} else set()
         used |= {"fit"} if "mac" in used else set()
         own = tuple(sorted(used & OWN))
         return Routines(self.fixed.closure(used - OWN, self.fixed.floor), own, self.fixed.tables, self.fixed.floor)

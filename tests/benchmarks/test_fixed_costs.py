@@ -1,19 +1,11 @@
-"""No filter in integers costs more on a Cortex-M0 than its ceiling."""
+"""No filter in integers costs more on a Cortex-M0 than its ceiling; on an AVR it costs less than plain C."""
 
 from __future__ import annotations
 
 import pytest
 
-from kfgen.cost import measure
-from kfgen.generate import build
-from kfgen.override import override
-from kfgen.simulate import simulate
-from kfgen.spec import loads
-from tests.oracle import problems
+from tests.benchmarks.fixed import cost
 
-ROWS = 20
-SPECS = {"cv4": problems.CV4, "ball": problems.BALL}
-FORMS = {"full": "standard", "ud": "bierman"}
 CEILINGS = {
     ("cv4", "full"): (3000, 2100),
     ("cv4", "ud"): (6500, 4000),
@@ -26,9 +18,16 @@ CEILINGS = {
 @pytest.mark.usefixtures("_tools")
 @pytest.mark.parametrize(("name", "covariance"), CEILINGS)
 def test_cost(name, covariance):
-    spec = override(loads(SPECS[name]), "q16.16", filter={"covariance": covariance, "update": FORMS[covariance]})
-    found = measure(spec, build(spec).files, simulate(spec, ROWS), target="cortex-m0")
+    found = cost(name, covariance, "cortex-m0")
     instructions, flash = CEILINGS[name, covariance]
     assert found.errors == 0
     assert found.step <= instructions
     assert found.flash_linked <= flash
+
+
+def test_an_avr_gains_by_products_of_its_own(needs):
+    needs("avr-gcc", "simavr")
+    ours, plain = cost("cv4", "full", "avr"), cost("cv4", "full", "avr", plain=True)
+    assert ours.errors == plain.errors == 0
+    assert ours.step < 0.6 * plain.step
+    assert ours.flash_linked < 0.6 * plain.flash_linked

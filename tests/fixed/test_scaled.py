@@ -14,6 +14,7 @@ from kfgen.emit.render import macro
 from kfgen.fixed import tables
 from kfgen.fixed.routines import closure
 from kfgen.fixed.scalar import INSIDE, Fixed
+from tests.boards.machines import BOARDS
 from tests.fixed.routines import COMPILERS, HEAD
 
 CALLS = """
@@ -26,6 +27,39 @@ void fmas(int n, const int32_t *c, const int32_t *a, const int32_t *b, const int
     for (int i = 0; i < n; i++) { out[i] = t_q_fma(c[i], a[i], b[i], s[i]); }
 }
 """
+DRAWN = """
+static uint32_t state, total;
+static int32_t drawn(void)
+{
+    state ^= state << 13;
+    state ^= state >> 17;
+    state ^= state << 5;
+    return t_q_bits(state);
+}
+static int32_t inside(void)
+{
+    const int32_t value = drawn();
+    return t_q_sar32(value, 2 + (int)(state & 15u));
+}
+static void count(int32_t value) { total = total * 31u + (uint32_t)value; }
+int tests(void);
+int tests(void)
+{
+    state = 1u;
+    total = 0;
+    for (int i = 0; i < ROUNDS; i++) {
+        const int32_t c = inside(), a = inside(), b = inside(), d = drawn(), e = drawn();
+        const int s = 17 + (int)(state & 15u);
+        uint32_t status = 0;
+        count(t_q_mac(c, a, b, s, &status));
+        if (status == 0) { count(t_q_fma(c, a, b, s)); }
+        count(t_q_mul(d, e, s, &status));
+        count((int32_t)status);
+    }
+    return total != EXPECTED;
+}
+"""
+ROUNDS = 2000
 PROTOTYPES = "\n".join(line + ";" for line in CALLS.splitlines() if line.startswith("void"))
 
 
@@ -41,16 +75,22 @@ def factors(source: random.Random) -> tuple[int, int, int, int]:
     return max(-INSIDE, min(INSIDE, c)), a, b, s
 
 
+def routines(floor: bool) -> str:
+    """The multiply-adds, and the product that saturates."""
+    view = SimpleNamespace(
+        name="t", NAME="T", routines=SimpleNamespace(own=("fit", "fma", "mac"), floor=floor), helpers=()
+    )
+    basic = macro("helpers_q.j2", "routines", "t", closure(["asr", "moved", "mul", "product", "round"], floor), tables,
+                  "T_SATURATED", floor=floor)  # fmt: skip
+    head = HEAD + "#define T_SATURATED SATURATED\ntypedef uint32_t t_status_t;\n"
+    return head + basic + macro("helpers_scaled.j2", "define", view)
+
+
 @pytest.mark.parametrize("rounding", ["nearest", "floor"])
 @pytest.mark.parametrize("target", ["", "-D__ARM_ARCH_6M__"])
 def test_interpreter_and_c_agree(target, rounding, tmp_path):
     floor = rounding == "floor"
-    routines = SimpleNamespace(own=("fit", "fma", "mac"), floor=floor)
-    view = SimpleNamespace(name="t", NAME="T", routines=routines, helpers=())
-    basic = macro("helpers_q.j2", "routines", "t", closure(["asr", "product", "round"], floor), tables, "T_SATURATED",
-                  floor=floor)  # fmt: skip
-    head = HEAD + "#define T_SATURATED SATURATED\ntypedef uint32_t t_status_t;\n"
-    (tmp_path / "t.c").write_text(head + basic + macro("helpers_scaled.j2", "define", view) + CALLS)
+    (tmp_path / "t.c").write_text(routines(floor) + CALLS)
     flags = ["-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", *target.split()]
     command = [COMPILERS[0], "-std=c99", *flags, "-shared", "-fPIC", "t.c", "-o", "t.so"]
     subprocess.run(command, cwd=tmp_path, check=True)
@@ -83,3 +123,43 @@ def test_interpreter_and_c_agree(target, rounding, tmp_path):
     assert any(flags_wanted)
     assert not all(flags_wanted)
     assert run("fmas", [row for row, _ in fitting]) == [value for _, value in fitting]
+
+
+def total_of(rounding: str) -> int:
+    """What DRAWN counts, as interpreted."""
+    scalar, state, total = Fixed("q16.16", rounding), 1, 0
+
+    def drawn() -> int:
+        nonlocal state
+        state ^= state << 13 & 0xFFFFFFFF
+        state ^= state >> 17
+        state ^= state << 5 & 0xFFFFFFFF
+        return state - (state >> 31 << 32)
+
+    def inside() -> int:
+        value = drawn()
+        return value >> (2 + (state & 15))
+
+    for _ in range(ROUNDS):
+        c, a, b, d, e = inside(), inside(), inside(), drawn(), drawn()
+        s = 17 + (state & 15)
+        scalar.status.bits = 0
+        found = [scalar.evaluate("q_mac", (s,), [c, a, b])]
+        if scalar.status.bits == 0:
+            found.append(scalar.evaluate("q_fma", (s,), [c, a, b]))
+        found += [scalar.evaluate("q_mul", (s,), [d, e]), scalar.status.bits]
+        for value in found:
+            total = (total * 31 + value) & 0xFFFFFFFF
+    return total
+
+
+@pytest.mark.parametrize("rounding", ["nearest", "floor"])
+@pytest.mark.parametrize("board", ["m0", "m4", "rv32", "avr"])
+def test_processors_agree(board, rounding, needs, tmp_path):
+    """Each has its own way to multiply."""
+    needs(*BOARDS[board].tools)
+    given = f"#define ROUNDS {ROUNDS}\n#define EXPECTED {total_of(rounding)}u\n"
+    (tmp_path / "t.c").write_text(routines(rounding == "floor") + given + DRAWN)
+    (tmp_path / "main.c").write_text("int tests(void);\nint main(void) { return tests(); }\n")
+    sources = ["t.c"] if board == "avr" else ["t.c", "main.c"]
+    assert BOARDS[board].status(tmp_path, sources, "-w") == 0
