@@ -14,7 +14,7 @@ from kfgen.fixed.certificate import Certificate, certify, lines
 from kfgen.fixed.formats import Formats, choose
 from kfgen.fixed.lowering import lower
 from kfgen.fixed.pace import Pace
-from kfgen.fixed.probe import Departure, probe
+from kfgen.fixed.probe import Departure, probe, shaken
 from kfgen.fixed.random import Random
 from kfgen.fixed.raw import size_of
 from kfgen.fixed.real import Ranges, RealProgram
@@ -28,8 +28,10 @@ from kfgen.logs import Log
 RUNS = ((1.0, 0.0, 0.5, 10), (2.0, 0.02, -0.5, 1), (1.0, 0.05, 0.0, 4))
 """Factor of the noises, share of outliers, correlation of the states that is given now and then, rows per reading."""
 STEPS = 300
+INFLATED = 2.0**22  # times a usual variance: what `adaptive` may make of it, or the usual one has no digits left
 LONG = 2000  # of a filter whose covariance does not depend on the data: to its steady state
 PROBED = 120  # rows that the integers are tried on
+CHAOTIC = 16.0  # times as far as real numbers depart by less than what formats lose
 FAILING = 0.25  # standard deviations by which they may be off
 
 
@@ -59,6 +61,8 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
         runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
     weather = Weather(code)
     pace = _nominal(runner, weather, real)
+    if code.model.options.inflation is not None:
+        runner.limits = [INFLATED * variance for variance in pace.typical()]
     for seed, (gain, outliers, correlation, every) in enumerate(RUNS, 2):
         log_, rows = weather.log(STEPS, Random(seed, gain), Random(100 + seed, gain, outliers))
         runner.run(log_, rows, correlation, every)
@@ -93,6 +97,8 @@ def _judge(program: RealProgram, real: FilterCode, integer: FilterCode, formats:
     found = probe(program, real, integer, formats, scalar, log, rows)
     if found.sigmas <= FAILING and not found.errors:
         return found
+    if not found.errors and not found.beyond(shaken(program, real, formats, log, rows), FAILING, CHAOTIC):
+        return found  # the model magnifies whatever is rounded
     state = real.model.spec.states[found.state]
     bits = max(1, math.ceil(math.log2(min(found.sigmas, 1e9) / FAILING))) if found.sigmas > FAILING else 1
     largest, least = _spread(formats, found.state, len(real.model.states))

@@ -66,6 +66,10 @@ class Pace:
         n = len(self.code.model.states)
         return other.arrays["P"][: n * n : n + 1]
 
+    def typical(self) -> list[float]:
+        """The variances of the run; none where they were not looked at."""
+        return [median(variances) for variances in zip(*self.before, strict=True)]
+
     def factors(self) -> list[float] | None:
         """By what to multiply the standard deviations to come near to where they settle; None where they are there."""
         if not self.left:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from typing import Any
 
 from kfgen.filters.base import FilterCode
@@ -17,6 +18,7 @@ from kfgen.fixed.scalar import Fixed
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Function
 
+SHAKEN = 2.0**-11  # of a covariance: what a format of 12 bits would lose in a step
 ERRORS = ("NOT_FINITE", "NOT_POSITIVE")
 
 
@@ -77,7 +79,21 @@ class Departure:
     sigmas: float
     row: int
     errors: int  # calls that only the integers refused
+    course: tuple[float, ...] = ()  # the error after each row
     peaks: Mapping[int, int] = field(default_factory=dict)  # see `certificate.certify`
+
+    def beyond(self, other: Departure, least: float, factor: float) -> bool:
+        """Whether an error is larger than `least`, and than `factor` times what the other has had by then."""
+        had = accumulate(other.course, max)
+        return any(not ours <= max(least, factor * theirs) for ours, theirs in zip(self.course, had, strict=True))
+
+
+def shaken(real: RealProgram, code: FilterCode, formats: Formats, log: Columns, rows: int) -> Departure:
+    """How far real numbers depart from themselves by digits that no format keeps.
+
+    In every row of the second run x is rounded to its LSB, and the covariance is off by SHAKEN of itself.
+    """
+    return _Shaken(real, code, formats).run(log, rows)
 
 
 def probe(real: RealProgram, code: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed, log: Columns,
@@ -89,7 +105,9 @@ def probe(real: RealProgram, code: FilterCode, integer: FilterCode, formats: For
 
 
 class _Probe:
-    def __init__(self, real: RealProgram, integer: IntegerProgram, code: FilterCode, formats: Formats,
+    """Two filters over one log: `a` of real numbers, `b` of integers."""
+
+    def __init__(self, real: RealProgram, integer: RealProgram, code: FilterCode, formats: Formats,
                  lowered: FilterCode) -> None:  # fmt: skip
         self.real = real
         self.integer = integer
@@ -120,6 +138,7 @@ class _Probe:
         n = len(self.code.model.states)
         run_time = self.spec.dt is not None and self.spec.dt.run_time
         worst = Departure(0, 0.0, 0, 0)
+        course = []
         for k in range(rows):
             for each in self.spec.inputs:
                 self.give(("number", f"u.{each.name}"), f"u.{each.name}", float(log[each.name][k]))
@@ -136,11 +155,23 @@ class _Probe:
                 for c, v in zip(sensor.components, values, strict=True):
                     self.give(("number", f"update_{sensor.name}", f"z.{c.name}"), f"z.{c.name}", v)
                 self.call(f"update_{sensor.name}")
+            self.between()
             state, sigmas = self._error(n)
+            course.append(sigmas)
             if not sigmas <= worst.sigmas:
                 worst = Departure(state, sigmas, k, 0)
         self._others()
-        return Departure(worst.state, worst.sigmas, worst.row, self.refused)
+        return replace(worst, errors=self.refused, course=tuple(course))
+
+    def between(self) -> None:
+        """What is done after each row."""
+
+    def value(self, i: int) -> float:
+        """State i of b."""
+        return math.ldexp(self.b.arrays["kf.x"][i], self._lsb(i))
+
+    def _lsb(self, i: int) -> int:
+        return self.formats.fixed[self.formats.arrays.element(("array", "kf.x"), i)]
 
     def _others(self) -> None:
         """What the run has not needed, once, in integers only."""
@@ -164,17 +195,46 @@ class _Probe:
             variances = [self.a.arrays["P"][i * n + i] for i in range(n)]
         worst = (0, 0.0)
         for i in range(n):
-            e = self.formats.fixed[self.formats.arrays.element(("array", "kf.x"), i)]
-            error = abs(self.a.arrays["kf.x"][i] - math.ldexp(self.b.arrays["kf.x"][i], e))
+            error = abs(self.a.arrays["kf.x"][i] - self.value(i))
             period = self.code.model.periods[i]
             if period is not None:
                 error = abs(math.remainder(error, float(period)))
-            error = max(0.0, error - math.ldexp(4.0, e))
+            error = max(0.0, error - math.ldexp(4.0, self._lsb(i)))
             sigma = math.sqrt(max(variances[i], 0.0))
             ratio = error / sigma if sigma > 1e-9 * (1e-300 + abs(self.a.arrays["kf.x"][i])) else 0.0
             if not ratio <= worst[1]:
                 worst = (i, ratio)
         return worst
+
+
+class _Shaken(_Probe):
+    """`b` is of real numbers too, a little off."""
+
+    def __init__(self, real: RealProgram, code: FilterCode, formats: Formats) -> None:
+        super().__init__(real, real, code, formats, code)
+        self.b = blank(code)
+        self.sign = 1.0
+
+    def give(self, cell: Cell, path: str, value: float) -> None:
+        super().give(cell, path, value)
+        self.b.numbers[path] = self.a.numbers[path]
+
+    def value(self, i: int) -> float:
+        return float(self.b.arrays["kf.x"][i])
+
+    def between(self) -> None:
+        x = self.b.arrays["kf.x"]
+        for i in range(len(self.code.model.states)):
+            if math.isfinite(x[i]):
+                x[i] = math.ldexp(math.floor(math.ldexp(x[i], -self._lsb(i)) + 0.5), self._lsb(i))
+        if {"get_covariance", "set_covariance"} <= self.names:
+            self.real.run("get_covariance", self.b)
+            self.sign = -self.sign
+            self.b.arrays["P"] = [(1.0 + self.sign * SHAKEN) * p for p in self.b.arrays["P"]]
+            self.real.run("set_covariance", self.b)
+
+    def _others(self) -> None:
+        pass
 
 
 def _integers(memory: Memory) -> Memory:

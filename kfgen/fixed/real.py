@@ -46,6 +46,15 @@ class Ranges:
             self.high[i] = max(self.high[i], value)
             self.low[i] = min(self.low[i], value)
 
+    def copy(self) -> tuple[list[float], ...]:
+        """What has been met so far; for `restore`."""
+        return list(self.high), list(self.low), list(self.small)
+
+    def restore(self, seen: tuple[list[float], ...]) -> None:
+        """Forget what has been met since."""
+        for values, old, blank in zip((self.high, self.low, self.small), seen, (0.0, 0.0, HUGE), strict=True):
+            values[:] = old + [blank] * (len(values) - len(old))
+
     def largest(self, key: Any) -> float:
         """The largest size met, 0 where nothing was."""
         i = self.index.get(key)

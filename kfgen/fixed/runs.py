@@ -44,6 +44,7 @@ class Runner:
         self.names = {f.name for f in code.functions}
         self.run_time = self.spec.dt is not None and self.spec.dt.run_time
         self.statuses: dict[str, int] = {}
+        self.limits: list[float] = []  # of variances: an update that inflates one beyond its own is as if not made
 
     def call(self, function: str, memory: Memory) -> str:
         status = self.program.run(function, memory)
@@ -78,7 +79,7 @@ class Runner:
                 continue
             for place, sensor in enumerate(self.spec.measurements):
                 if (k + place) % every == 0:
-                    self._update(memory, sensor, log, k)
+                    self._limited(memory, sensor, log, k)
             if every > 1 and rows - 2 * OUTAGE < 2 * k <= rows:
                 found = self._variances(memory)
                 least = [min(pair) for pair in zip(least or found, found, strict=True)]
@@ -100,6 +101,16 @@ class Runner:
         ]  # fmt: skip
         self.call("set_covariance", memory)
         self._look(memory)
+
+    def _limited(self, memory: Memory, sensor: Any, log: Columns, k: int) -> None:
+        if not self.limits:
+            self._update(memory, sensor, log, k)
+            return
+        before, seen = memory.copy(), self.ranges.copy()
+        self._update(memory, sensor, log, k)
+        if any(new > limit for new, limit in zip(self._variances(memory), self.limits, strict=True)):
+            self.ranges.restore(seen)
+            memory.arrays, memory.numbers = before.arrays, before.numbers
 
     def _grown(self, memory: Memory, least: list[float]) -> bool:
         """Whether a variance has become so large in an outage that the state is as good as unknown."""
