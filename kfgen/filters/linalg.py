@@ -91,9 +91,9 @@ def rank_one(U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]], safe
     weights = [d for _, d, _ in columns]
     for j in reversed(range(len(D))):
         steps = []
-        # a pivot of zero starts with its own column: from another, that may hardly reach it, it would take a U without
-        # bounds, to which the next one loses its digits
-        first = sorted(range(len(W)), key=lambda c: columns[c][2] != j) if is_zero(D[j]) else range(len(W))
+        # a pivot that may be zero starts with its own column: from another, that may hardly reach it, it would take a U
+        # without bounds, to which the next one loses its digits
+        first = sorted(range(len(W)), key=lambda c: columns[c][2] != j) if not is_positive(D[j]) else range(len(W))
         for c in first:
             w = W[c]
             if not is_zero(weights[c]) and not is_zero(w[j]):

@@ -14,7 +14,7 @@ from kfgen.ir import interpret
 from kfgen.override import override
 from kfgen.spec.loading import loads
 from kfgen.status import Status
-from tests.oracle.problems import NOISE_INPUTS
+from tests.oracle.problems import ATT, NOISE_INPUTS
 
 BALL = """
 kfgen: 1
@@ -141,6 +141,19 @@ def test_constant_velocity(covariance, update):
 def test_correlated_readings_and_conditions_that_are_known():
     """A guard that cannot fail leaves a factor of 1, and the digits of the other one are all there."""
     assert follow(NOISE_INPUTS, steps=30, driven=("gnss",)) < 0.01
+
+
+def test_noise_that_does_not_reach_all_states():
+    """That of three rates on a quaternion has no spread along it: a pivot of nothing but round-off."""
+    kf, ref = (kfgen.compile(loads(ATT), scalar, flags=["-O0"]) for scalar in ("q16.16", "double"))
+    log = simulate.simulate(loads(ATT), 60, seed=22).columns
+    for k in range(60):
+        u = [log[name][k] for name in kf.inputs]
+        z = [log[f"imu.{c}"][k] for c in kf.sensors["imu"]]
+        for each in (kf, ref):
+            each.predict(u)
+            each.update("imu", z)
+        assert np.max(np.abs(kf.x - ref.x) / np.sqrt(np.diag(ref.P))) < 0.05
 
 
 def test_metres_beside_radians_need_no_hint():
