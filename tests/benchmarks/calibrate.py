@@ -3,7 +3,8 @@
 Every spec of the repository and the problems of the tests are generated in all forms of the covariance, written out and
 in loops, as float, double and fixed point, and compiled for a Cortex-M4F; each emitted function is one equation for the
 flash, and one for the stack; the routines of a fixed-point filter are one for the flash of what it calls. The
-coefficients are the non-negative ones of least relative error. Prints the errors; writes the table.
+coefficients are the non-negative ones of least relative error. A filter's functions together, whose flash a budget is
+about, are one more equation. Prints the errors; writes the table.
 """
 
 from __future__ import annotations
@@ -99,6 +100,9 @@ def rows(job: Job) -> list[Row]:
                 whole.arrays += part.arrays
                 whole.live = max(whole.live, part.live)
         out.append((scalar, f"{label} {function.name}", whole, size, depth))
+    steps = [row for row in out if row[1].rpartition(" ")[2].startswith(("init", "predict", "update"))]
+    counts = sum((row[2].counts for row in steps), Counter[str]())
+    out.append((scalar, f"{label} together", Traits(counts), sum(row[3] for row in steps), 0))
     routines = generated.view.routines
     if routines is not None:
         size = sum(flash[name] for name in flash if name.startswith(f"{spec.name}_q_"))
