@@ -22,11 +22,13 @@ LOOPING = (
 def choose(straight: FilterCode, looped: FilterCode, budget: int, loops: bool, scalar: str) -> FilterCode:
     """The functions of two forms of a filter, loops where straight-line code would exceed the budget in bytes.
 
-    Those that save most become loops first; none does that saves nothing. loops: all of them are. Where even the
-    smallest choice is predicted to exceed the budget, it is that one: whoever judges budgets tells.
+    Those that save most become loops first; none does that saves nothing. loops: all of them are. Where nothing is
+    sure to fit, all become loops if loops are what is smaller, so that `auto` then takes what `none` takes. Whether it
+    is predicted to exceed the budget is told by whoever judges budgets.
     """
     names = [f.name for f in straight.functions if _counted(f)]
-    rolled: set[str] = set(names) if loops else set()
+    everything = set(names)
+    rolled = everything if loops else set[str]()
 
     def flash(chosen: set[str]) -> int:
         functions = with_privates(_mixed(straight, looped, chosen)).functions
@@ -37,11 +39,12 @@ def choose(straight: FilterCode, looped: FilterCode, budget: int, loops: bool, s
         sizes = {name: flash(rolled | {name}) for name in names if name not in rolled}
         smaller = {name: size for name, size in sizes.items() if size < found}
         if not smaller:  # perhaps all together, which share private functions
-            everything = set(names)
-            if rolled != everything and flash(everything) < found:
+            if flash(everything) < found:
                 rolled = everything
             break
-        rolled.add(min(smaller, key=lambda name: smaller[name]))
+        rolled = rolled | {min(smaller, key=lambda name: smaller[name])}
+    if flash(rolled) * MARGIN > budget and flash(everything) <= flash(set()):
+        rolled = everything
     return _mixed(straight, looped, rolled)
 
 
@@ -71,7 +74,9 @@ def with_privates(code: FilterCode) -> FilterCode:
 
 
 def _mixed(straight: FilterCode, looped: FilterCode, rolled: set[str]) -> FilterCode:
-    """Functions by name from either."""
+    """Functions by name from either. Where all that is called in a step is loops, the rest is what goes with these."""
+    if all(f.name in rolled for f in straight.functions if _counted(f)):
+        return told(looped, rolled)
     other = {f.name: f for f in looped.functions}
     functions = tuple(other[f.name] if f.name in rolled else f for f in straight.functions if not f.private)
     constants = {**straight.constants, **looped.constants} if rolled else straight.constants

@@ -22,7 +22,8 @@ LIBRARY = {"float": 40, "double": 96, "q": 40}  # bytes of stack of newlib's fun
 CROWDED = 100  # numbers beyond the registers, from which on the flags were measured to pay
 KEPT = 14  # of these, those that outlast a call
 _CALLS = {"sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "pow", "floor"}
-_BRANCHES = {"wrap", "segment", "table", "sign", "min", "max"}
+_BRANCHES = {"wrap", "segment", "table"}
+_SELECTIONS = {"min": 1, "max": 1, "sign": 2}
 _FREE = {"variable", "counter", "const"}
 
 
@@ -36,6 +37,12 @@ class Traits:
     reloaded: int = 0  # reads of numbers at such places
     arrays: int = 0  # numbers in local arrays
     kept: int = 0  # the most numbers that outlast a call of a function
+    looped: bool = False
+
+    @property
+    def kinds(self) -> Counter[str]:
+        """The counts by kinds that have a size of their own: in loops compilers do otherwise."""
+        return Counter({f"{kind}, looped" if self.looped else kind: n for kind, n in self.counts.items()})
 
 
 def traits(function: Function) -> Traits:
@@ -47,6 +54,7 @@ def traits(function: Function) -> Traits:
     constants: set[Node] = set()
     loads: set[Node] = set()
     for statement in walk(function.body):
+        found.looped |= isinstance(statement, For)
         _statement(statement, counts)
         if isinstance(statement, Declare) and statement.size is not None:
             found.arrays += statement.size
@@ -107,6 +115,10 @@ def _expression(root: Node, counts: Counter[str], constants: set[Node], loads: s
             counts["library"] += 1
         elif op in _BRANCHES:
             counts["branch"] += 1
+        elif op in _SELECTIONS:
+            counts["select"] += _SELECTIONS[op]
+        elif op == "abs":
+            counts["term"] += 1
         elif op in ("lt", "le", "and", "or", "not", "bit"):
             counts["compare"] += 1
         elif op not in _FREE:
@@ -158,7 +170,7 @@ def crowded(functions: Iterable[Function]) -> bool:
 
 
 def _bytes(found: Traits, table: Mapping[str, float]) -> float:
-    return sum(table.get(kind, table["other"]) * count for kind, count in found.counts.items())
+    return sum(table.get(kind, table["other"]) * count for kind, count in found.kinds.items())
 
 
 def predicted(functions: Iterable[Function], scalar: str = "float") -> int:

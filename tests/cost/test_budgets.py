@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from kfgen.ir import footprint
 from kfgen.override import override
 from kfgen.simulate import simulate
 from kfgen.spec import load, loads
+from tests.benchmarks.calibrate import compiled
 from tests.oracle import problems
 
 ROOT = Path(__file__).parents[2]
@@ -41,6 +43,31 @@ def test_every_spec_is_predicted(needs):
         assert totals["ram"] == cost.ram
         assert sum(prediction.ram.values()) <= cost.ram < sum(prediction.ram.values()) + 8
         assert abs(totals["stack"] - cost.stack) <= max(40, 0.4 * cost.stack), (spec.name, totals["stack"], cost.stack)
+
+
+def compiled_flash(spec):
+    """Bytes of what a prediction is of, as compiled and not linked."""
+    generated = build(spec, judge=False)
+    flags = recommended_flags(generated.files[f"{spec.name}.h"])
+    flash, _ = compiled(spec.name, generated.files, flags)
+    rest = rf"{spec.name}_(set_|get_|redraw|update_\w+_masked)"
+    found = sum(size for name, size in flash.items() if not re.match(rest, name))
+    return generated.summary.prediction.totals["flash"], found
+
+
+# of fixed point, whose files take long to compile, the small ones
+@pytest.mark.parametrize(("scalar", "names"), [
+    (None, [path.stem for path in SPECS]), ("q16.16", ["battery", "cv4", "pendulum", "scalar", "vehicle_tutorial"]),
+])  # fmt: skip
+def test_loops_and_fixed_point_are_predicted(needs, scalar, names):
+    needs("arm-none-eabi-gcc")
+    specs = [load(ROOT / "specs" / f"{name}.yaml") for name in names]
+    specs = [override(spec, scalar or spec.scalar) for spec in specs]
+    specs = [replace(spec, code=replace(spec.code, unroll="none")) for spec in specs]
+    with ThreadPoolExecutor(2) as pool:
+        results = list(pool.map(compiled_flash, specs))
+    for spec, (predicted, found) in zip(specs, results, strict=True):
+        assert abs(predicted / found - 1) <= WITHIN, (spec.name, predicted, found)
 
 
 UNSEEN = """
@@ -109,6 +136,10 @@ def test_an_impossible_budget_is_an_error_that_tells_where_the_bytes_go(tmp_path
     assert flash.place.path == "code.flash"
     assert ram.message.startswith("60 bytes of RAM on a Cortex-M4F, 20 more than the budget of 40 (U 24; x 16; D 16;")
     assert re.search(r"\(.*update_gnss \d+, \d+ too many.*\)", stack.message)
+    # in fixed point likewise, the routines by themselves
+    with pytest.raises(SpecError) as caught:
+        build(override(spec, "q16.16"))
+    assert re.search(r"\(.*predict \d+.*; routines \d+.*\)", caught.value.mistakes[0].message)
     # the command: exit status 2, the place, and nothing written, of other specs neither
     (tmp_path / "tight.yaml").write_text(budgeted(problems.VEHICLE4, "flash: 500"))
     (tmp_path / "fine.yaml").write_text(problems.CV4)

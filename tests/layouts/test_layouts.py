@@ -121,12 +121,17 @@ def test_arduino_properties(build):
     assert properties["category"] in ("Data Processing", "Other")
 
 
-def test_a_sketch_of_a_fixed_step(build, needs):
+@pytest.mark.parametrize(
+    ("text", "scalar", "written"),
+    [(problems.CV4, "float", "100000UL"), (problems.CV4, "q16.16", "_X_FROM(0)"), (problems.IMM3, "float", "kf.x[")],
+)
+def test_sketches_of_fixed_steps_fixed_point_and_banks(build, needs, text, scalar, written):
     needs("avr-g++")
-    folder = build("arduino", problems.CV4)
-    assert "100000UL" in (folder / "examples/cv4_example/cv4_example.ino").read_text()
+    folder = build("arduino", text, "--scalar", scalar)
+    (sketch,) = folder.glob("examples/*/*.ino")
+    assert written in sketch.read_text()
     run(folder, "avr-g++", "-mmcu=atmega328p", "-Os", "-Wall", "-Wextra", "-Werror", "-I", "src", "-I", BOARDS,
-        "-include", "Arduino.h", "-x", "c++", "-c", "examples/cv4_example/cv4_example.ino", "-o", "o.o")  # fmt: skip
+        "-include", "Arduino.h", "-x", "c++", "-c", sketch, "-o", "o.o")  # fmt: skip
 
 
 # https://docs.platformio.org/en/latest/manifests/library-json: the fields that are used, and no others

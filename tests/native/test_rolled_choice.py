@@ -119,3 +119,20 @@ def test_unscented_filters(covariance):
             assert call(a, name, arguments) == call(b, name, arguments) == 0
     np.testing.assert_allclose(a.x, b.x, rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(a.P, b.P, rtol=1e-10, atol=1e-12)
+
+
+def test_banks():
+    """Loops of all modes call the same private functions, each emitted once."""
+    text = problems.IMM3.replace("{type: ekf}", "{type: ekf, covariance: full, update: standard}")
+    spec = loads(text)
+    looped = build(replace(spec, code=replace(spec.code, unroll="none")))
+    assert looped.summary.forms == {"predict": "loops", "update_position": "loops"}
+    private = [f.name for f in looped.code.functions if f.private]
+    assert private
+    assert len(set(private)) == len(private)
+    straight = flash(build(replace(spec, code=replace(spec.code, unroll="full"))))
+    assert flash(looped) < straight
+    for budget in (straight, int(MARGIN * straight) + 1):
+        made = build(replace(spec, code=replace(spec.code, flash=budget)))
+        assert ("loops" in made.summary.forms.values()) == (budget == straight)
+        assert flash(made) <= budget
