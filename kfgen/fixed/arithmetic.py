@@ -101,6 +101,14 @@ def div(a: int, b: int, s: int, status: Status) -> int:
     return clamp((2 * numerator + denominator) // (2 * denominator), status)
 
 
+def ratio(a: int, b: int, d: int, s: int, status: Status) -> int:
+    """a b 2^s / d, of the product its 31 highest bits, -62 <= s <= 62; otherwise as `div`."""
+    product = a * b
+    drop = max(0, product.bit_length() - 31)
+    top = abs(product) >> drop
+    return div(top if product >= 0 else -top, d, s + drop, status)
+
+
 def reciprocal(b: int, s: int, status: Status) -> int:
     """2^s / b, 0 <= s <= 62; 1/0 is LIMIT, flagged."""
     return div(1, b, s, status)

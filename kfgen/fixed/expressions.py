@@ -97,6 +97,10 @@ class Expressions(Functions):
             case "variable":
                 if node.data in c.inverses:
                     return self.inverse(node, e)
+                if node.data in c.ratios:
+                    num, den, condition = c.ratios[node.data]
+                    e = self.natural(c.nodes[node.data]) if e is None else e
+                    return self.guarded(self._divided(num, den, e or 0), condition)
                 return c.locals[node.data]
             case "field":
                 cell = number_of(c.function, node.data)

@@ -13,7 +13,7 @@ from kfgen.fixed.cells import Cell, affine, array_of, number_of, plain
 from kfgen.fixed.expressions import Expressions
 from kfgen.fixed.formats import Formats
 from kfgen.fixed.plan import Plan, variables
-from kfgen.fixed.raw import DYNAMIC, LIMIT, Context, QTable, Raw, constant, is_variance, nearest
+from kfgen.fixed.raw import DYNAMIC, LIMIT, SPREAD, Context, QTable, Raw, constant, is_variance, nearest
 from kfgen.fixed.unroll import make
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
@@ -153,9 +153,10 @@ class _Statements:
                 self.c.known[name] = value
                 return []
             return [Let(value, name)]
-        out = self.inverse(s)
-        if out is not None:
-            return out
+        for made in (self.inverse, self.ratio):
+            out = made(s)
+            if out is not None:
+                return out
         if node.op in ("element", "field", "read", "variable"):
             raw = self.x.value(node)
         else:
@@ -201,20 +202,46 @@ class _Statements:
                 return None
         elif largest == 0 or largest <= DYNAMIC * smallest:
             return None
-        test = None if condition is None else self.x.index(condition)
         out: list[Statement] = []
-        if test is not None and test.op not in ("variable",):
-            name = f"{s.name}_some"
-            out.append(Let(test, name))
-            test = make("variable", (), name, "bool")
-        den = self.x.value(node.args[1])
-        if den.node.op not in ("variable", "element", "field"):
-            name = f"{s.name}_of"
-            out.append(Let(den.node, name))
-            den = replace(den, node=make("variable", (), name))
-        self.c.inverses[s.name] = (den, test)
+        test = self._tested(s.name, condition, out)
+        self.c.inverses[s.name] = (self._simple(f"{s.name}_of", node.args[1], out), test)
         self.c.known[f"1/{s.name}"] = node
         return out
+
+    def ratio(self, s: Let) -> list[Statement] | None:
+        """A quotient that is far larger now and then than it usually is: it is made with each product that it is in."""
+        if s.name in self.ties or self.c.formats.ranges.spread(self.f.name, s.name) <= SPREAD:
+            return None
+        node, condition = s.node, None
+        if node.op == "select" and node.args[2].constant == 0:
+            condition, node = node.args[0], node.args[1]
+        out: list[Statement] = []
+        if node.op == "div":
+            num, den, test = node.args[0], self._simple(f"{s.name}_of", node.args[1], out), None
+        elif node.op == "mul" and any(a.data in self.c.inverses for a in node.args):
+            num, inverse = node.args if node.args[1].data in self.c.inverses else node.args[::-1]
+            den, test = self.c.inverses[inverse.data]
+        else:
+            return None
+        test = self._tested(s.name, condition, out) if test is None else test
+        self.c.ratios[s.name] = (self._simple(f"{s.name}_by", num, out), den, test)
+        return out
+
+    def _tested(self, name: str, condition: Node | None, out: list[Statement]) -> Node | None:
+        """A condition as a truth value that is kept."""
+        test = None if condition is None else self.x.index(condition)
+        if test is None or test.op == "variable":
+            return test
+        out.append(Let(test, f"{name}_some"))
+        return make("variable", (), f"{name}_some", "bool")
+
+    def _simple(self, name: str, node: Node, out: list[Statement]) -> Raw:
+        """A value that is kept."""
+        raw = self.x.value(node)
+        if raw.node.op in ("variable", "element", "field"):
+            return raw
+        out.append(Let(raw.node, name))
+        return replace(raw, node=make("variable", (), name))
 
     def store(self, s: Store | Assign) -> Store | Assign:
         index = None if s.index is None else self.x.index(s.index)

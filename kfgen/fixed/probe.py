@@ -28,6 +28,9 @@ class _IntegerSource(Source):
     def record(self, key: Any, value: str, small: bool = False) -> None:
         pass
 
+    def quotient(self, node: Node, name: str) -> None:
+        pass
+
     def value(self, node: Node) -> str:
         match node.op:
             case "const" if node.kind == "real":

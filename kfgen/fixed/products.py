@@ -30,7 +30,7 @@ class Products(Values):
             e = self.natural(node)
         if e is None:
             e = self._guess((a, b)) if a.constant is None else self._guess((b,)) + size_of(a.constant)
-        elif fine and not (self._inverse_of(a) or self._inverse_of(b)):
+        elif fine and not self._special(a, b):
             if a.constant is None:  # what one LSB of either factor makes is below any use
                 e = max(e, self.value(a).e + self.value(b).e + USEFUL)
             else:
@@ -48,14 +48,14 @@ class Products(Values):
         inverse = self._inverse_of(b)
         if inverse is not None:
             den, condition = inverse
-            quotient = self._divided(self.value(a), den, e)
-            if condition is None:
-                return quotient
-            return Raw(make("select", (condition, quotient.node, constant(0))), e, -LIMIT, LIMIT)
+            return self.guarded(self._divided(self.value(a), den, e), condition)
+        if self.ratio_of(a):
+            a, b = b, a
+        ratio = self.ratio_of(b)
+        if ratio is not None:
+            return self.guarded(self._ratio(ratio, self.value(a), e), ratio[2])
         if b.constant is not None:
             a, b = b, a
-        if a.constant is not None and b.op == "mul" and not b.args[0].constant:
-            pass
         ra, rb, s, most = self._factors(a, b, e)
         if ra is None or rb is None:
             return Raw(constant(0), e, 0, 0)
@@ -64,6 +64,24 @@ class Products(Values):
         if not 0 <= s <= 62:
             return self._shifted_product(ra, rb, e)
         return self._mul(ra, rb, s, e, most)
+
+    def guarded(self, quotient: Raw, condition: Node | None) -> Raw:
+        """0 where the condition does not hold."""
+        if condition is None:
+            return quotient
+        return Raw(make("select", (condition, quotient.node, constant(0))), quotient.e, -LIMIT, LIMIT)
+
+    def ratio_of(self, node: Node) -> tuple[Raw, Raw, Node | None] | None:
+        """Of a quotient that is not kept, numerator, denominator and condition."""
+        return self.c.ratios.get(node.data) if node.op == "variable" else None
+
+    def _ratio(self, ratio: tuple[Raw, Raw, Node | None], b: Raw, e: int) -> Raw:
+        """A quotient times b, at e."""
+        num, den, _ = ratio
+        s = num.e + b.e - den.e - e
+        if b.node.constant is not None and s > 62:
+            return self._divided(num, den, e)
+        return Raw(make("q_ratio", (num.node, b.node, den.node), (max(-62, min(62, s)),)), e)
 
     def _mul(self, a: Raw, b: Raw, s: int, e: int, most: int | None = None) -> Raw:
         a, b, s, most = self._within(a, b, s, most)
@@ -170,7 +188,7 @@ class Products(Values):
                 a, b = map(self.folded, node.args)
                 if b.constant is not None:
                     a, b = b, a
-                if self._inverse_of(a) or self._inverse_of(b):
+                if self._special(a, b):
                     return None
                 if a.constant is not None:
                     inner = self.digits(b)
@@ -182,7 +200,7 @@ class Products(Values):
                     if f[0].constant is None or len(f) == 2:
                         found.append(self.digits(f[0] if len(f) == 1 else make("mul", f)))
                 return None if not found or None in found else min(v for v in found if v is not None)
-            case "variable" if node.data in self.c.inverses:
+            case "variable" if node.data in self.c.inverses or node.data in self.c.ratios:
                 return None
         return self.value(node).e
 
@@ -190,7 +208,7 @@ class Products(Values):
         """An exponent a little coarser at which a product is proved to fit, if there is one."""
         a, b = map(self.folded, node.args)
         natural = self.natural(node)
-        if natural is None or self._inverse_of(a) or self._inverse_of(b):
+        if natural is None or self._special(a, b):
             return e
         if e is None:
             return None
@@ -202,6 +220,10 @@ class Products(Values):
             bound *= 1 if f.constant is None else abs(f.constant)
         needed = size_of(bound) - BITS if bound else e
         return needed if e < needed <= natural + ROOMIER else e
+
+    def _special(self, *factors: Node) -> bool:
+        """Whether a product is made by a division."""
+        return any(self._inverse_of(f) is not None or self.ratio_of(f) is not None for f in factors)
 
     def _inverse_of(self, node: Node) -> tuple[Raw, Node | None] | None:
         if node.op == "div" and node.args[0].constant == 1 and self.c.formats.more:

@@ -19,6 +19,7 @@ LEAST = -(2**31)
 DYNAMIC = 1024  # a reciprocal whose runs span more than this is made with each quotient
 FIRST = 17  # the least shift of a product that has been proved to fit
 ROOMIER = 3  # bits that a product may lose so that it is proved to fit
+SPREAD = 2.0**12  # times its usual size: a quotient that becomes so large is made with each product that it is in
 UNSEEN = 4  # bits for a choice that no run has made
 LAST = 32  # the largest
 USEFUL = 20  # bits: a product of two full factors has no use for more than 62 less these
@@ -55,6 +56,7 @@ class Context:
     unlimited: set[str] = field(default_factory=set)  # locals that are only divided by, or compared
     signs: dict[Node, bool] = field(default_factory=dict)  # whether a value is known not to be negative
     inverses: dict[str, tuple[Raw, Node | None]] = field(default_factory=dict)  # 1/x, 0 unless the condition holds
+    ratios: dict[str, tuple[Raw, Raw, Node | None]] = field(default_factory=dict)  # a/b, 0 unless the condition holds
     risks: Counter[str] = field(default_factory=Counter)
 
 

@@ -29,6 +29,7 @@ class Ranges:
     high: list[float] = field(default_factory=list)
     low: list[float] = field(default_factory=list)
     small: list[float] = field(default_factory=list)
+    quotients: dict[tuple[str, str], list[float]] = field(default_factory=dict)  # function, local -> all its values
 
     def slot(self, key: Any) -> int:
         """The place of a cell or of a node."""
@@ -59,6 +60,11 @@ class Ranges:
         """The largest size met, 0 where nothing was."""
         i = self.index.get(key)
         return 0.0 if i is None else max(self.high[i], -self.low[i])
+
+    def spread(self, function: str, name: str) -> float:
+        """By how much the largest size of a quotient exceeds its usual one; 0 where it was never made."""
+        sizes = sorted(abs(v) for v in self.quotients.get((function, name), []) if v and math.isfinite(v))
+        return sizes[-1] / sizes[len(sizes) // 2] if sizes else 0.0
 
     def smallest(self, key: Any) -> float:
         i = self.index.get(key)

@@ -35,6 +35,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "estimate": ("asr",),
     "inverse": ("estimate", "mulh"),
     "div": ("leading", "inverse", "mulh", "signed", "limit"),
+    "ratio": ("product", "leading", "div"),
     "reciprocal": ("leading", "estimate", "signed", "limit"),
     "root": ("mulh", "asr"),
     "sqrt": ("leading", "root", "limit", "signed"),

@@ -26,6 +26,13 @@ if TYPE_CHECKING:
     from kfgen.fixed.real import RealProgram
 
 
+def unguarded(node: Node) -> Node:
+    """What a choice takes where its condition holds, if it takes 0 otherwise."""
+    while node.op == "select" and node.args[2].constant == 0:
+        node = node.args[1]
+    return node
+
+
 class Source:
     """Writes one function; a subclass may say otherwise how numbers are computed."""
 
@@ -38,6 +45,7 @@ class Source:
         self.count = 0
         self.private = {a.name for a in function.arguments if a.size is not None} if function.private else set()
         self.local: set[str] = set()
+        self.inverses: set[str] = set()  # locals that are 1/x
 
     def text(self) -> str:
         if self.f.private:
@@ -85,6 +93,7 @@ class Source:
                 return
             case Let(node=node, name=name):
                 self.emit(f"l_{name} = {self.value(node)}")
+                self.quotient(node, name)
             case Declare(name=name, size=size, value=value):
                 self.local.add(name)
                 if size is not None:
@@ -118,6 +127,15 @@ class Source:
                 self.nested(f"for c_{v} in {span}:", body)
             case Call():
                 self.call(s)
+
+    def quotient(self, node: Node, name: str) -> None:
+        """Keep the values of a local that is a quotient."""
+        node = unguarded(node)
+        if node.op == "div" and node.args[0].constant is not None:
+            self.inverses.add(name)
+        elif node.op == "div" or (node.op == "mul" and any(a.data in self.inverses for a in node.args)):
+            values = self.ranges.quotients.setdefault((self.f.name, name), [])
+            self.emit(f"{self.program.bound(values)}.append(l_{name})")
 
     def call(self, s: Call) -> None:
         args = []

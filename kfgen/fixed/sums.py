@@ -64,7 +64,7 @@ class Sums(Products):
         a, b = map(self.folded, factors)
         if b.constant is not None:
             a, b = b, a
-        if self._inverse_of(a) or self._inverse_of(b):
+        if self._special(a, b):
             product = self._product(a, b, e)
             return self._plus(total, sign, product, e)
         ra, rb, s, most = self._factors(a, b, e)

@@ -20,6 +20,7 @@ TWINS: dict[str, Callable[..., int]] = {
     "word": basic.word,
     "rest": basic.rest,
     "div": basic.div,
+    "ratio": basic.ratio,
     "reciprocal": basic.reciprocal,
     "sqrt": basic.sqrt,
     "floor": basic.floor,

@@ -23,7 +23,7 @@ from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
 # routine -> its arguments: w an int64_t, h a positive one, l one of 52 bits, i a raw int32_t, m one below 2^30; other
 # letters are ints of a range of their own
 ARGUMENTS = {
-    "gather": "liis", "stretch": "wiu", "word": "ws", "rest": "lc",
+    "gather": "liis", "stretch": "wiu", "word": "ws", "rest": "lc", "ratio": "iiit",
     "narrow": "ws", "mul": "iis", "madd": "imms", "add": "ii", "sub": "ii", "shift": "it", "div": "iit",
     "reciprocal": "is", "sqrt": "it", "floor": "if", "wrap": "ih", "hypot": "ii", "sin": "iff", "cos": "iff",
     "atan": "iff", "atan2": "iir", "exp": "iff", "log": "iff", "tan": "ifg",
