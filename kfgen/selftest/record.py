@@ -88,7 +88,7 @@ def _stepped(spec: Spec, kf: ReferenceFilter, track: Track, k: int, rounded: boo
         if status >= Status.ERROR or not np.all(np.isfinite(kf.x)):
             return False
         if rounded:
-            kf.set_state(kf.x.astype(np.float32).astype(np.float64))
+            kf.displace(lambda x: x.astype(np.float32).astype(np.float64))  # of a bank, that of every mode
     return True
 
 
