@@ -23,6 +23,9 @@ SUFFIX = "_long"
 ONE = 1 << CARRIED
 
 
+MINUS = Raw(constant(-ONE * 2), -CARRIED - 1, -ONE * 2, -ONE * 2)
+
+
 class Carry:
     """The carried cells of one function. Raises nothing: what has no chain is rounded as ever."""
 
@@ -91,13 +94,18 @@ class Carry:
                 branches = (self.long(a, cell) for a in node.args[1:])
                 return make("select", (self._condition(node.args[0], cell), *branches), None, LONG)
             case "neg":
-                return self._scaled(self.long(node.args[0], cell), Raw(constant(-1), 0, -1, -1))
+                return self._scaled(self.long(node.args[0], cell), MINUS)
             case "mul" if path.depth(node) is not None:
                 a, b = path.ordered(node.args)
                 taken = self._taken(b)
                 if taken is not None:
                     return self._plus(self.long(a, cell), -1, taken, e)
-                return self._scaled(self.long(a, cell), self.x.factor(b))
+                factor = self.x.factor(b)
+                finest = -CARRIED - 1
+                if factor.e > finest and factor.size << (factor.e - finest) <= LIMIT:
+                    factor = self.x.at(factor, finest)
+                if factor.e <= finest:  # or the factor may be so large that what it multiplies has to be small
+                    return self._scaled(self.long(a, cell), factor)
             case "sum" | "add" | "sub" if path.depth(node) is not None:
                 return self._sum(node, cell, e)
         return self._plus(constant(0), 1, (node,), e)
@@ -120,7 +128,7 @@ class Carry:
         sign, factors = terms.pop(chain)
         total = self.long(factors[0] if len(factors) == 1 else make("mul", factors), cell)
         if sign < 0:
-            total = self._scaled(total, Raw(constant(-1), 0, -1, -1))
+            total = self._scaled(total, MINUS)
         for sign, factors in terms:
             total = self._plus(total, sign, factors, e)
         return total
@@ -164,8 +172,6 @@ class Carry:
         return node
 
     def _scaled(self, long: Node, b: Raw) -> Node:
-        if b.e > -CARRIED:  # the upper word is multiplied by itself
-            b = self.x.at(b, -CARRIED)
         return make("q_stretch", (long, b.node), (-b.e,), LONG)
 
     def _plus(self, total: Node, sign: int, factors: tuple[Node, ...], e: int) -> Node:

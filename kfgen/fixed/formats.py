@@ -120,20 +120,19 @@ def _carry(code: FilterCode, formats: Formats, pace: Pace) -> None:
             carry(cell, states[i])
     if not pace.moved:
         return
-    variances, others = ("D", "U") if "kf.D" in pace.moved else ("P", "P")
+    name = "D" if "kf.D" in pace.moved else "P"
     slow: set[int] = set()
-    for diagonal in (True, False):  # beside a slow variance, correlations may be slow as well
+    for diagonal in (True, False) if name == "P" else (True,):  # beside a slow variance, correlations may be slow
         for j in range(len(states)):
             for i in (j,) if diagonal else range(j):
-                name = f"kf.{variances if diagonal else others}"
-                index = j if name == "kf.D" else j * (j - 1) // 2 + i if name == "kf.U" else j * (j + 1) // 2 + i
-                cell = arrays.element(("array", name), index)
+                index = j if name == "D" else j * (j + 1) // 2 + i
+                cell = arrays.element(("array", f"kf.{name}"), index)
                 e = formats.of(cell)
                 if e is None or not (diagonal or {i, j} & slow):
                     continue
-                if pace.crawls(name, index, code.order[j] if diagonal else None, math.ldexp(1.0, e)):
+                if pace.crawls(f"kf.{name}", index, code.order[j] if diagonal else None, math.ldexp(1.0, e)):
                     slow |= {j} if diagonal else set()
-                    carry(cell, f"{variances}[{states[code.order[j]]}]" if diagonal else "")
+                    carry(cell, f"{name}[{states[code.order[j]]}]" if diagonal else "")
 
 
 class _Interface:

@@ -16,7 +16,7 @@ from kfgen.filters.base import FilterCode
 from kfgen.fixed.real import Memory, RealProgram
 
 EVERY = 8  # rows between two looks
-GRAIN = 32.0  # LSBs of a variance that a step has to add, or its rounding is felt
+GRAIN = 256.0  # LSBs of a variance that a step has to add, or its rounding is felt
 DRIFT = 0.01  # standard deviations that the rounding of a state may shift it by
 FASTEST = 1 / 64  # by which a standard deviation is brought nearer at once
 SETTLED = 0.9
@@ -37,7 +37,7 @@ class Pace:
     def __post_init__(self) -> None:
         names = {f.name for f in self.code.functions}
         self.known = "get_covariance" in names and not self.code.modes
-        self.fields = [f"kf.{b.name}" for b in self.code.blocks if b.name in ("D", "U", "P")]
+        self.fields = [f"kf.{b.name}" for b in self.code.blocks if b.name in ("D", "P")]
 
     def look(self, k: int, rows: int, memory: Memory, step: Callable[[], object]) -> None:
         """Make step k of `rows`, by calling `step`, and see what it changes."""
@@ -90,7 +90,7 @@ class Pace:
         return 0.5 * lsb * math.sqrt(P) > DRIFT * g
 
     def crawls(self, block: str, index: int, i: int | None, lsb: float) -> bool:
-        """Whether a step changes an element of D, U or P by too little for its LSB. i: the state of a variance."""
+        """Whether a step changes an element of D or P by too little for its LSB. i: the state of a variance."""
         if not self.moved:
             return False
         found = None if i is None else self._settling(i)
