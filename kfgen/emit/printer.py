@@ -134,7 +134,7 @@ class Printer:
             args += [] if op in self.scalar.silent_ops else [self.status]
             return f"{self.prefix}_{op}({', '.join(args)})"
         if op.startswith("table_"):
-            return f"{self.tables[node.data]}{op.removeprefix('table')}[{args[0]}]"
+            return self._constant_at(f"{self.tables[node.data]}{op.removeprefix('table')}", args[0])
         if op in self.scalar.helper_ops:
             self.helpers.add(op)
             if op == "wrap":

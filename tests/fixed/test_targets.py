@@ -29,13 +29,16 @@ LEVELS = ("-O0", "-O2", "-O3")
 
 
 def fixed() -> list[Spec]:
-    """Of each way to carry a covariance one, and one in which influence functions, inflation and functions meet."""
+    """Of each way to carry a covariance one, one in which influence functions, inflation and functions meet, and one
+    with a table and rounding that is carried on.
+    """
     cv4, turn = load(SPECS / "cv4.yaml"), "type: ekf, robust: {influence: chernodarov}, adaptive: true"
     return [
         replace(override(cv4, "q16.16", filter={"covariance": "full", "update": "joseph"}), name="cv4_full"),
         override(cv4, "q16.16"),
         override(load(SPECS / "pendulum.yaml"), "q16.16"),
         loads(TURN.replace("type: ekf", turn)),
+        override(load(SPECS / "battery.yaml"), "q16.16"),
     ]
 
 
