@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from typing import cast
@@ -14,7 +14,9 @@ from kfgen.fixed.expressions import Expressions
 from kfgen.fixed.formats import Formats
 from kfgen.fixed.plan import Plan, variables
 from kfgen.fixed.raw import DYNAMIC, LIMIT, SPREAD, Context, QTable, Raw, constant, is_variance, nearest
+from kfgen.fixed.scalar import FINE
 from kfgen.fixed.unroll import make
+from kfgen.fixed.values import between
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
     Argument,
@@ -34,6 +36,7 @@ from kfgen.ir.program import (
     walk,
 )  # fmt: skip
 
+PROBABILITY = "what mu has below its LSB"
 REST = "what x and the variances have below their LSB, by 2^-16 of it"
 STATUS = Argument("flags", "{name}_status_t", pointer=True, constant=False)
 
@@ -53,6 +56,8 @@ def lower(code: FilterCode, formats: Formats) -> FilterCode:
             for i, value in enumerate(block.initial)
         )
         blocks.append(replace(block, initial=initial))
+    if code.modes and formats.bits < FINE:
+        blocks.append(Block("rest", len(code.modes), PROBABILITY, initial=tuple(_rests(code, formats))))
     if formats.carried:
         size = len(formats.carried)
         blocks.append(Block("rest", size, REST, initial=(Fraction(0),) * size))
@@ -61,6 +66,13 @@ def lower(code: FilterCode, formats: Formats) -> FilterCode:
         tables=cast(Mapping[Table, str], {tables[t]: name for t, name in code.tables.items() if t in tables}),
         lookups={lookups[c][0]: name for c, name in code.lookups.items() if c in lookups}, constants={},
     )  # fmt: skip
+
+
+def _rests(code: FilterCode, formats: Formats) -> Iterator[Fraction]:
+    """What mu0 has below its LSB."""
+    (mu,) = (block for block in code.blocks if block.name == "mu")
+    for value in mu.initial:
+        yield _raw(value, -FINE, FINE) - (_raw(value, -formats.bits, formats.bits) * 2 ** (FINE - formats.bits))
 
 
 def _raw(value: Fraction, e: int | None, bits: int) -> Fraction:
@@ -87,9 +99,11 @@ class _Statements:
         return replace(self.f, body=body, arguments=arguments)
 
     def _ties(self) -> None:
-        """Locals that are stored as they are take the format of where they go."""
+        """Locals that are stored as they are take the format of where they go; mu has more digits inside."""
         for s in walk(self.f.body):
-            if isinstance(s, Store | Assign) and s.node.op == "variable" and s.node.kind == "real":
+            if not isinstance(s, Store | Assign) or s.name == "kf.mu":
+                continue
+            if s.node.op == "variable" and s.node.kind == "real":
                 self.ties.setdefault(s.node.data, self.target(s))
 
     def target(self, s: Store | Assign) -> Cell:
@@ -124,6 +138,8 @@ class _Statements:
                 return [replace(s, value=self.x.value(value, e).node)]
             case Assign():
                 return [self.store(s)]
+            case Store() if s.name == "kf.mu" and self.c.formats.bits < FINE:
+                return self.probability(s)
             case Store():
                 cell = self.carry.cell_of(s)
                 return [self.store(s)] if cell is None else self.carried(s, cell)
@@ -254,6 +270,17 @@ class _Statements:
         if isinstance(s, Store) and raw.low < 0 and s.index is not None and is_variance(s.name, s.index):
             node = make("q_max", (node, constant(0)))
         return replace(s, index=index, node=node)
+
+    def probability(self, s: Store) -> list[Statement]:
+        """An element of mu and its rest."""
+        assert s.index is not None
+        index, k = self.x.index(s.index), FINE - self.c.formats.bits
+        name = f"mu_{affine(s.index)[0]}_fine"
+        fine = make("variable", (), name)
+        word = make("q_shift", (fine,), (k,))
+        rest = make("sub", (fine, make("mul", (word, constant(1 << k)))))
+        made = between(self.x.value(s.node, -FINE).node, 1 << FINE)
+        return [Let(made, name), Store(s.name, index, word), Store("kf.rest", index, rest)]
 
     def carried(self, s: Store, cell: Cell) -> list[Statement]:
         """A store with its rest."""

@@ -12,6 +12,7 @@ from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
 
 PREFIX = "q_"
 INSIDE = 2**30 - 1
+FINE = 26  # fraction bits that a probability has inside, as sums of them have
 
 
 class Fixed:
@@ -31,7 +32,7 @@ class Fixed:
     def __init__(self, name: str, rounding: str = arithmetic.NEAREST) -> None:
         self.name = name
         self.bits = int(name.partition(".")[2])
-        self.probability = Fraction(1, 2**self.bits)
+        self.probability = Fraction(1, 2 ** max(self.bits, FINE))
         self.rounding = rounding
         self.status = Status()
 

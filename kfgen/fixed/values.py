@@ -9,6 +9,7 @@ from math import floor
 
 from kfgen.fixed.formats import BITS
 from kfgen.fixed.raw import INSIDE, LEAST, LIMIT, Context, Raw, constant, is_variance, nearest, power, same, size_of
+from kfgen.fixed.scalar import FINE
 from kfgen.fixed.unroll import make
 from kfgen.ir.nodes import Node
 
@@ -68,10 +69,14 @@ class Values:
         return Raw(node, -self.c.formats.bits if e is None else e, low, high)
 
     def probability(self, node: Node) -> Raw:
-        """One that the user may have set: brought between 0 and 1."""
-        one = 1 << self.c.formats.bits
-        node = make("q_min", (make("q_max", (node, constant(0))), constant(one)))
-        return Raw(node, -self.c.formats.bits, 0, one)
+        """An element of mu, which the user may have set: between 0 and 1, with the digits that its rest has."""
+        bits = self.c.formats.bits
+        place, k = node.args, max(0, FINE - bits)
+        node = between(node, 1 << bits)
+        if k:
+            rest = make("element", place, "kf.rest")
+            node = between(make("add", (make("mul", (node, constant(1 << k))), rest)), 1 << FINE)
+        return Raw(node, -bits - k, 0, 1 << (bits + k))
 
     def literal(self, value: Fraction, e: int | None) -> Raw:
         if value == 0:
@@ -199,3 +204,8 @@ class Values:
                 if e <= raw.e and raw.size << (raw.e - e) <= INSIDE:  # neither rounded nor clipped when it was added
                     return (1 << max(-raw.e - over.e, 0)) + (1 << BITS)
         return None
+
+
+def between(node: Node, most: int) -> Node:
+    """Brought between 0 and most."""
+    return make("q_min", (make("q_max", (node, constant(0))), constant(most)))
