@@ -5,6 +5,7 @@ Exit status: 0 done, 1 a check failed, 2 the spec, the call or its surroundings 
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from typing import Any
@@ -83,4 +84,5 @@ for command in (build, check, run, simulate, cost, language):
 
 def main() -> None:
     """The entry point of the console script."""
+    gc.set_threshold(100_000)  # a build makes many expressions and few cycles: looking for these is a tenth of it
     cli(prog_name="kfgen")

@@ -145,7 +145,7 @@ class Limits:
 
         Raises StepError NOT_FINITE.
         """
-        if not (np.all(np.isfinite(x)) and np.all(np.isfinite(P))):
+        if not (np.isfinite(x).all() and np.isfinite(P).all()):
             raise StepError(Status.NOT_FINITE)
         flags = Status.OK
         if self._floor or self._ceiling:

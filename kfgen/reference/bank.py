@@ -183,5 +183,5 @@ def _each(calls: Iterable[Callable[[], T]]) -> list[T]:
 
 
 def _require_finite(x: Vector, P: Matrix) -> None:
-    if not (np.all(np.isfinite(x)) and np.all(np.isfinite(P))):
+    if not (np.isfinite(x).all() and np.isfinite(P).all()):
         raise StepError(Status.NOT_FINITE)

@@ -104,7 +104,7 @@ def centre(images: Matrix, weights: PointSet, bent: Sequence[bool], image: Calla
     if any(bent):
         chosen = np.array(bent)
         base[chosen] = image()[chosen]
-        if not np.all(np.isfinite(base)):
+        if not np.isfinite(base).all():
             raise StepError(Status.NOT_FINITE)
     return base
 

@@ -46,6 +46,6 @@ def curvature(numbers: Sequence[Number], B: Matrix) -> tuple[Vector, Matrix]:
     bent = [hessian(number, len(B)) @ B for number in numbers]
     shift = np.array([0.5 * np.trace(bend) for bend in bent])
     spread = np.array([[0.5 * np.trace(a @ b) for b in bent] for a in bent])
-    if not (np.all(np.isfinite(shift)) and np.all(np.isfinite(spread))):
+    if not (np.isfinite(shift).all() and np.isfinite(spread).all()):
         raise StepError(Status.NOT_FINITE)
     return shift, symmetric(spread)

@@ -120,7 +120,7 @@ class ReferenceFilter:
     def set_state(self, x: ArrayLike) -> int:
         """Sets x (n), wrapped; NOT_FINITE leaves the filter as it was."""
         new = np.array(x, dtype=np.float64).reshape(self.model.n)
-        if not np.all(np.isfinite(new)):
+        if not np.isfinite(new).all():
             return int(Status.NOT_FINITE)
         self._estimate = self.algorithm.placed(self._estimate, lambda x: self.model.wrap(new))
         return int(Status.OK)
@@ -135,7 +135,7 @@ class ReferenceFilter:
         given = np.array(P, dtype=np.float64).reshape(self.model.n, self.model.n)
         new = np.triu(given) + np.triu(given, 1).T
         try:
-            if not np.all(np.isfinite(new)):
+            if not np.isfinite(new).all():
                 raise StepError(Status.NOT_FINITE)
             with np.errstate(all="ignore"):
                 U, D = udu(new, computed=False)
@@ -157,7 +157,7 @@ class ReferenceFilter:
         root = np.tril(np.array(S, dtype=np.float64).reshape(self.model.n, self.model.n))
         with np.errstate(all="ignore"):
             new = root @ root.T
-        if not np.all(np.isfinite(new)):
+        if not np.isfinite(new).all():
             return int(Status.NOT_FINITE)
         self._estimate = self.algorithm.with_covariance(self._estimate, new)
         return int(Status.OK)
@@ -175,7 +175,7 @@ class ReferenceFilter:
             raise TypeError("predict: this filter takes dt")
         try:
             step, flags = self._step.nominal, Status.OK
-            if not np.all(np.isfinite(inputs)) or (dt is not None and not math.isfinite(dt)):
+            if not np.isfinite(inputs).all() or (dt is not None and not math.isfinite(dt)):
                 raise StepError(Status.NOT_FINITE)
             if self._step.run_time and dt is not None:
                 step, flags = self._step.clamped(float(dt))
@@ -201,7 +201,7 @@ class ReferenceFilter:
             return int(Status.OK)
         reading = Reading(model, measured, used, Context(self.parameters, inputs, self._clock.now, 0.0))
         try:
-            if not np.all(np.isfinite(measured[list(used)])) or not np.all(np.isfinite(inputs)):
+            if not np.isfinite(measured[list(used)]).all() or not np.isfinite(inputs).all():
                 raise StepError(Status.NOT_FINITE)
             if self._initialises(reading):
                 return int(self._initialise(reading))

@@ -35,7 +35,7 @@ class Iekf(Ekf):
         flags = result.flags
         for _ in range(self._iterations - 1):
             x = model.wrap(prior + result.dx)
-            if not np.all(np.isfinite(x)):
+            if not np.isfinite(x).all():
                 raise StepError(Status.NOT_FINITE)
             linear = sensor.linearise(x, reading)
             y = sensor.innovation(linear.h, x, reading) - linear.H @ model.wrap(prior - x)

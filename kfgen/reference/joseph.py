@@ -67,7 +67,7 @@ def update(P: Matrix, H: Matrix, R: Matrix, y: Vector, rules: Rules = PLAIN) -> 
     """
     _, D = udu(R)
     S = symmetric(H @ P @ H.T + R)
-    if rules == PLAIN and len(y) > 1 and np.all(D > 0.0) and np.all(S.diagonal() > 0.0):
+    if rules == PLAIN and len(y) > 1 and (D > 0.0).all() and (S.diagonal() > 0.0).all():
         root = np.sqrt(S.diagonal())
         if np.linalg.cond(S / np.outer(root, root)) <= _WELL_CONDITIONED:
             return batch(P, H, R, y)

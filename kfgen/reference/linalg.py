@@ -30,11 +30,15 @@ def udu(P: Matrix, computed: bool = True) -> tuple[Matrix, Vector]:
     judged by the eigenvalues of its correlations, and pivots up to 8 n eps P_jj are 0.
     """
     n = len(P)
+    zero = 8.0 * n * EPS if computed else n * EPS
+    if np.count_nonzero(P) == np.count_nonzero(P.diagonal()):  # which most R are: nothing is eliminated
+        pivots = P.diagonal()
+        if (pivots < 0.0).any():
+            raise StepError(Status.NOT_POSITIVE)
+        return np.eye(n), np.where(pivots > zero * pivots, pivots, 0.0)
     rest = np.triu(P) + np.triu(P, 1).T
     scale = rest.diagonal().copy()
-    zero = n * EPS
     if computed:
-        zero *= 8.0
         _judge(rest)
     U, D = np.eye(n), np.zeros(n)
     for j in range(n - 1, -1, -1):
@@ -52,12 +56,12 @@ def udu(P: Matrix, computed: bool = True) -> tuple[Matrix, Vector]:
 def _judge(P: Matrix) -> None:
     """Raises NOT_POSITIVE unless the correlations of P are positive semidefinite to rounding."""
     variances = P.diagonal()
-    if np.any(variances < 0.0):
+    if (variances < 0.0).any():
         raise StepError(Status.NOT_POSITIVE)
     if np.count_nonzero(P) == np.count_nonzero(variances):
         return
     sigma = np.sqrt(variances)
-    if np.any(P[sigma == 0.0] != 0.0):
+    if (P[sigma == 0.0] != 0.0).any():
         raise StepError(Status.NOT_POSITIVE)
     sigma[sigma == 0.0] = 1.0
     if np.min(np.linalg.eigvalsh(P / np.outer(sigma, sigma))) < -1e3 * len(P) * EPS:
@@ -74,6 +78,6 @@ def lower_root(P: Matrix) -> Matrix:
 
 def check_covariance(P: Matrix) -> None:
     """Raises NOT_FINITE or NOT_POSITIVE unless P, computed from formulas, is a covariance."""
-    if not np.all(np.isfinite(P)):
+    if not np.isfinite(P).all():
         raise StepError(Status.NOT_FINITE)
     _judge(P)

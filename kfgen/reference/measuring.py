@@ -94,7 +94,7 @@ class Measuring:
         R, noise = self._noise(estimate, reading, cloud, seen, noise)
         y = reading.sensor.innovation(seen.z, estimate.x, reading)
         S, rounding = seen.spread.covariance + R, seen.spread.rounding
-        if not np.all(np.isfinite(S)):
+        if not np.isfinite(S).all():
             raise StepError(Status.NOT_FINITE)
         check_covariance(self._input_covariance(estimate.x, reading, self._within(cloud, reading)))
         exact = bool(np.any(udu(R)[1] == 0.0))
@@ -122,7 +122,7 @@ class Measuring:
         H, M = regression(estimate.P, seen.cross), regression(C, seen.noise)
         R = symmetric(R + M @ C @ M.T)
         y = reading.sensor.innovation(seen.z, estimate.x, reading)
-        if not (np.all(np.isfinite(H)) and np.all(np.isfinite(R))):
+        if not (np.isfinite(H).all() and np.isfinite(R).all()):
             raise StepError(Status.NOT_FINITE)
         check_covariance(C)
         plain = update(estimate.P, H, R, y, self.plain)
@@ -138,7 +138,7 @@ class Measuring:
         if not inputs:
             return np.zeros((0, 0))
         C = reading.sensor.input_covariance(x, reading.context)[np.ix_(inputs, inputs)]
-        if not np.all(np.isfinite(C)):
+        if not np.isfinite(C).all():
             raise StepError(Status.NOT_FINITE)
         return symmetric(C)
 
@@ -172,7 +172,7 @@ class Measuring:
             return values(sensor.predict(at, [float(v) for v in noise], reading.context, reading.used))
 
         images = np.array([image(point, e) for point, e in zip(cloud.points, cloud.noise, strict=True)])
-        if not np.all(np.isfinite(images)):
+        if not np.isfinite(images).all():
             raise StepError(Status.NOT_FINITE)
         bent = [sensor.bent[i] for i in reading.used]
         base = centre(images, weights, bent, lambda: image(x, np.zeros(len(carried))))

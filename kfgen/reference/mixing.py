@@ -42,7 +42,7 @@ def moments(model: Model, estimates: Sequence[Estimate], weights: Vector) -> tup
 def transition_rows(M: Matrix) -> Matrix:
     """M (B, B), each row divided by its sum. Raises StepError NOT_FINITE, or NOT_POSITIVE where an entry is
     negative or a row has nothing."""
-    if not np.all(np.isfinite(M)):
+    if not np.isfinite(M).all():
         raise StepError(Status.NOT_FINITE)
     sums = np.sum(M, axis=1)
     if np.any(M < 0.0) or np.any(sums == 0.0):

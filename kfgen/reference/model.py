@@ -83,6 +83,8 @@ class Model:
         own = ("t", "dt", Z, PREDICTED, INNOVATION)
         self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, *own))
         self._noise_slots = tuple(self.scope.slots[name] for name in noises)
+        self._state_slots = tuple(self.scope.slots[name] for name in self.states)
+        self._input_slots = tuple(self.scope.slots[name] for name in self.inputs)
         for definition in spec.let:
             self.scope.define(definition.name, definition.value)
 
@@ -111,10 +113,10 @@ class Model:
         environment, slots = self.scope.empty(), self.scope.slots
         for name, parameter in context.parameters.items():
             environment[slots[name]] = parameter
-        for name, entry in zip(self.inputs, context.u, strict=False):
-            environment[slots[name]] = float(entry)
-        for name, number in zip(self.states, x, strict=True):
-            environment[slots[name]] = number if not isinstance(number, np.floating) else float(number)
+        for slot, entry in zip(self._input_slots, context.u.tolist(), strict=False):
+            environment[slot] = entry
+        for slot, number in zip(self._state_slots, x.tolist() if isinstance(x, np.ndarray) else x, strict=True):
+            environment[slot] = float(number) if isinstance(number, np.floating) else number
         environment[slots["t"]], environment[slots["dt"]] = context.t, context.dt
         for slot in self._noise_slots:
             environment[slot] = 0.0

@@ -94,7 +94,7 @@ class Process:
         added = Q + G @ Qw[held] @ G.T
         if self._white:
             added = added + self._diffusion(x, Qw[np.ix_(self._white, self._white)], context)
-        if not (np.all(np.isfinite(x_next)) and np.all(np.isfinite(F)) and np.all(np.isfinite(added))):
+        if not (np.isfinite(x_next).all() and np.isfinite(F).all() and np.isfinite(added).all()):
             raise StepError(Status.NOT_FINITE)
         check_covariance(Q)
         check_covariance(Qw)
@@ -143,7 +143,7 @@ class Process:
             added = added + G @ held[np.ix_(rest, rest)] @ G.T
         if self._white:
             added = added + self._diffusion(x, Qw[np.ix_(self._white, self._white)], context)
-        if not (np.all(np.isfinite(added)) and np.all(np.isfinite(Qw))):
+        if not (np.isfinite(added).all() and np.isfinite(Qw).all()):
             raise StepError(Status.NOT_FINITE)
         return Disturbance(symmetric(added), held[np.ix_(own, own)], (Q, Qw))
 
@@ -197,7 +197,7 @@ class Process:
         rate = self._rate(variables(x), [float(v) for v in w], still, context)
         A, generator = jacobian(rate, n), np.zeros((n + 1, n + 1))
         generator[:n] = np.column_stack([A, values(rate) - A @ x])
-        if not np.all(np.isfinite(generator)):
+        if not np.isfinite(generator).all():
             return np.full(n, math.nan)
         after: Vector = (expm(generator * context.dt) @ np.append(x, 1.0))[:n]
         return after
@@ -231,7 +231,7 @@ class Process:
 
 
 def _finite(matrix: Matrix) -> Matrix:
-    if not np.all(np.isfinite(matrix)):
+    if not np.isfinite(matrix).all():
         raise StepError(Status.NOT_FINITE)
     return matrix
 

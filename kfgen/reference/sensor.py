@@ -86,7 +86,7 @@ class SensorModel:
         h, H, M = values(predicted), derivatives[:, :n], derivatives[:, n:]
         inputs = M @ self.input_covariance(x, reading.context) @ M.T
         R = symmetric(self.noise(x, reading.context, reading.used) + inputs)
-        if not (np.all(np.isfinite(h)) and np.all(np.isfinite(H)) and np.all(np.isfinite(R))):
+        if not (np.isfinite(h).all() and np.isfinite(H).all() and np.isfinite(R).all()):
             raise StepError(Status.NOT_FINITE)
         return Linearisation(h, H, R, symmetric(inputs))
 
@@ -145,7 +145,7 @@ class SensorModel:
                 y[k] = wrap(measured - predicted, period)
             else:
                 y[k] = measured - predicted
-        if not np.all(np.isfinite(y)):
+        if not np.isfinite(y).all():
             raise StepError(Status.NOT_FINITE)
         return y
 

@@ -94,7 +94,7 @@ class Steady(Ekf):
         return Correction(replace(estimate, x=x), result.log_likelihood, result.flags)
 
     def _finish(self, x: Vector) -> Vector:
-        if not np.all(np.isfinite(x)):
+        if not np.isfinite(x).all():
             raise StepError(Status.NOT_FINITE)
         return self.model.wrap(self.model.clip(x))
 

@@ -74,7 +74,7 @@ class Ukf(Algorithm):
         terms = magnitude(lambda point: self.process.jacobian(point, context), cloud.points)
         mean, around = average(images, base, wrapped(images - base, self.model), weights, terms)
         P = around.covariance + noise.added
-        if not (np.all(np.isfinite(mean)) and np.all(np.isfinite(P))):
+        if not (np.isfinite(mean).all() and np.isfinite(P).all()):
             raise StepError(Status.NOT_FINITE)
         noise.judge()
         P, gone = self._spread_as_root(P, around, weights.wc, noise.added)
@@ -100,13 +100,13 @@ class Ukf(Algorithm):
             for i, image in enumerate(images):
                 if i != middle and self._rejected(image, context):
                     images[i], flags = images[middle], Status.POINT_REJECTED
-        if not np.all(np.isfinite(images)):
+        if not np.isfinite(images).all():
             raise StepError(Status.NOT_FINITE)
         return np.array(images), flags
 
     def _rejected(self, image: Vector, context: Context) -> bool:
         """Whether the spec rejects the image (n) of a point, as f left it; t is that of the step's start."""
-        if not np.all(np.isfinite(image)):
+        if not np.isfinite(image).all():
             return True
         return self._reject is not None and bool(self._reject(self.model.environment(context, image)))
 
@@ -127,12 +127,12 @@ class Ukf(Algorithm):
 
         Factored forms must be definite to be factored; a full P is judged as its floor leaves it.
         """
-        if not (np.all(np.isfinite(x)) and np.all(np.isfinite(P))):
+        if not (np.isfinite(x).all() and np.isfinite(P).all()):
             raise StepError(Status.NOT_FINITE)
         full = self.model.spec.filter.covariance == "full"
         x, P, flags = self.limits.finish(x, P if full else settled(P, rounding), context)
         P = settled(P, rounding) if full else P
-        if not np.all(np.isfinite(P)):
+        if not np.isfinite(P).all():
             raise StepError(Status.NOT_FINITE)
         return x, P, flags
 

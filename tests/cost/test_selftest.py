@@ -6,6 +6,7 @@ import re
 import subprocess
 from functools import cache
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 
@@ -33,12 +34,10 @@ def files_of(spec) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def everything(tmp_path_factory):
+def everything(tmp_path_factory, once):
     """scalar -> a folder with every spec of the repository and a function `tests` that runs their self-tests."""
 
-    @cache
-    def folder_of(scalar: str) -> Path:
-        folder = tmp_path_factory.mktemp(scalar)
+    def write(folder: Path, scalar: str) -> None:
         names = []
         for path in SPECS:
             spec = load(path)
@@ -47,7 +46,11 @@ def everything(tmp_path_factory):
             for name, text in files_of(spec).items():
                 (folder / name).write_text(text)
         _write_tests(folder, names)
-        return folder
+
+    @cache
+    def folder_of(scalar: str) -> Path:
+        shared, _ = once(f"everything-{scalar}", lambda folder: write(folder, scalar))
+        return Path(copytree(shared, tmp_path_factory.mktemp(scalar), dirs_exist_ok=True))
 
     return folder_of
 

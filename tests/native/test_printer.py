@@ -24,7 +24,7 @@ from kfgen.spec import loads
 from kfgen.status import Status
 
 # float: long enough to meet gates, limits and turns of angles; double differs in spelling only
-STEPS = {"float": 100, "double": 25}
+STEPS = {"float": 60, "double": 20}
 STEPS_OF = {"chain16": 3, "att": 12, "chain8": 20}  # the large ones repeat the same few patterns
 
 
