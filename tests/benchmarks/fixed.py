@@ -42,16 +42,18 @@ def cost(problem: str, covariance: str, target: str, scalar: str = "q16.16", pla
     log = simulate(spec, ROWS)
     if not plain:
         return measure(spec, files, log, target=target)
-    return measure(spec, _plain(spec.name, files), log, target=target, flags=("-U__AVR_HAVE_MUL__", "-w"))
+    return measure(spec, _plain(spec.name, files), log, target=target, flags=("-w",))
 
 
 def _plain(name: str, files: Mapping[str, str]) -> dict[str, str]:
-    """With the library's division."""
+    """With the library's division, and sums of 64 bits."""
     q = f"{name}_q"
     head, end, tail = files[f"{name}.c"].rpartition(f"{name}_status_t {name}_predict(")
     definition = re.compile(rf"^static int32_t {q}_reciprocal\(.*?^}}\n", re.DOTALL | re.MULTILINE)
     assert definition.search(head)
     head = definition.sub(LIBRARY.format(q=q, name=name), head)
+    head = head.replace("__AVR_HAVE_MUL__", "OWN_PRODUCTS")  # which a header of the library would define again
+    tail = tail.replace(f"{q}_mac(", f"{q}_clipped(")
     return {**files, f"{name}.c": (head + end + tail).replace(f"{q}_reciprocal(", f"{q}_library(")}
 
 

@@ -9,7 +9,7 @@ from kfgen.native import compiler
 
 @pytest.fixture(autouse=True, scope="module")
 def _quick_builds() -> Iterator[None]:
-    """Integers, and doubles without contraction, are the same at every level: `test_targets` asks that of all."""
+    """Integers are the same at every level, which `test_targets` asks of filters of each kind; -O1 compiles sooner."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compiler, "DEFAULT_FLAGS", ("-O1",))
         yield
