@@ -66,7 +66,7 @@ class Carry:
         """What forgets the rest of a cell that is given anew."""
         return Store("kf.rest", integer(self.cells[cell]), constant(0))
 
-    def upper(self, s: Store, cell: Cell) -> tuple[list[Statement], Node, Store] | None:
+    def kept(self, s: Store, cell: Cell) -> tuple[list[Statement], Node, Store] | None:
         """What a store has to make before it, the rounded value, and the store of the rest; None without a chain."""
         if id(s) not in self.stores:
             return None

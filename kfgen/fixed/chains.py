@@ -88,9 +88,7 @@ class Path:
                     waiting.append(self.nodes[node.data])
                 case "neg":
                     waiting += node.args
-                case "mul":
-                    waiting.append(self.ordered(node.args)[0])
-                case "add" | "sub":
+                case "mul" | "add" | "sub":
                     waiting.append(self.ordered(node.args)[0])
                 case "sum":
                     waiting.append(self._term(node))

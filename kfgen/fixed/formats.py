@@ -263,7 +263,7 @@ class _Interface:
                 f.fixed[cell] = max(min(e, wanted), exponent(1.05 * largest, 0))
             if e is not None and "S" not in fields:
                 name = f"{place}{'D' if 'D' in fields else 'P'}[{self.model.states[state]}]"
-                gave = "head-room given to the process noise" if f.fixed[cell] < e else ""
+                gave = "room given to process noise" if f.fixed[cell] < e else ""
                 f.report.append(Quantity(name.removeprefix("modes."), largest, f.fixed[cell], gave, BITS))
         if "P" not in fields:
             return

@@ -286,10 +286,10 @@ class _Statements:
         """A store with its rest."""
         stored = self.store(s)
         assert isinstance(stored, Store)
-        upper = self.carry.upper(s, cell)
-        if upper is None:
+        kept = self.carry.kept(s, cell)
+        if kept is None:
             return [stored, self.carry.cleared(cell)]
-        lets, node, rest = upper
+        lets, node, rest = kept
         raw = Raw(node, self.exponent(cell))
         if not self._is_outside(cell):
             raw = self.x.fit(raw)

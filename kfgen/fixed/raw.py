@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import floor
@@ -57,7 +56,6 @@ class Context:
     signs: dict[Node, bool] = field(default_factory=dict)  # whether a value is known not to be negative
     inverses: dict[str, tuple[Raw, Node | None]] = field(default_factory=dict)  # 1/x, 0 unless the condition holds
     ratios: dict[str, tuple[Raw, Raw, Node | None]] = field(default_factory=dict)  # a/b, 0 unless the condition holds
-    risks: Counter[str] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
