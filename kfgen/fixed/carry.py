@@ -60,7 +60,7 @@ class Carry:
     def local(self, s: Let) -> list[Statement]:
         """A local of a chain in 64 bits, beside the rounded one."""
         cell = self.members.get(s.name)
-        return [] if cell is None else [Let(self.long(s.node, cell), s.name + SUFFIX)]
+        return [] if cell is None else _by_terms(self.long(s.node, cell), s.name + SUFFIX)
 
     def cleared(self, cell: Cell) -> Store:
         """What forgets the rest of a cell that is given anew."""
@@ -74,7 +74,7 @@ class Carry:
         long = self.long(s.node, cell)
         if long.op != "variable":
             name = f"{s.name.rpartition('.')[2].lower()}_{affine(s.index)[0] if s.index is not None else 0}{SUFFIX}"
-            lets.append(Let(long, name))
+            lets += _by_terms(long, name)
             long = make("variable", (), name, LONG)
         rest = make("q_rest", (long,), (CARRIED,))
         return lets, make("q_word", (long,), (CARRIED,)), replace(self.cleared(cell), node=rest)
@@ -204,3 +204,18 @@ class Carry:
         elif s > 62:
             a = self.x.at(a, a.e + s - 62)
         return make("q_gather", (total, a.node, b.node), (e - a.e - b.e,), LONG)
+
+
+def _by_terms(node: Node, name: str) -> list[Statement]:
+    """A local of 64 bits, a statement for each term of its sum."""
+    out = [Let(node, name)]
+    while node.op in _TERMS and node.args[0].op in _TERMS:
+        inner, before = node.args[0], f"{name}{len(out)}"
+        first = make("variable", (), before, LONG)
+        out[-1] = replace(out[-1], node=make(node.op, (first, *node.args[1:]), node.data, LONG))
+        out.append(Let(inner, before))
+        node = inner
+    return [*reversed(out)]
+
+
+_TERMS = ("q_gather", "q_stretch")
