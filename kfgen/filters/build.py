@@ -9,27 +9,27 @@ from typing import Any
 import sympy
 
 from kfgen.errors import Mistake, SpecError
-from kfgen.filters import process
+from kfgen.filters.algebra.numbers import is_zero
+from kfgen.filters.bank.imm import Imm
 from kfgen.filters.base import FilterCode
 from kfgen.filters.choice import choose, told, with_privates
-from kfgen.filters.ekf import Ekf
-from kfgen.filters.full import Full
-from kfgen.filters.imm import Imm
-from kfgen.filters.iterated import Iekf
-from kfgen.filters.layout import GainChange, Layout
-from kfgen.filters.looped import Kernels
-from kfgen.filters.numbers import is_zero
+from kfgen.filters.covariance.base import GainChange, Layout
+from kfgen.filters.covariance.full.loops import RolledFull
+from kfgen.filters.covariance.full.straight import Full
+from kfgen.filters.covariance.looped import Kernels
+from kfgen.filters.covariance.sqrt.loops import RolledSqrt
+from kfgen.filters.covariance.sqrt.straight import Sqrt
+from kfgen.filters.covariance.ud.loops import RolledUD
+from kfgen.filters.covariance.ud.straight import UD
+from kfgen.filters.frame.shared import unused
+from kfgen.filters.kinds.ekf import Ekf
+from kfgen.filters.kinds.ekf2 import Ekf2
+from kfgen.filters.kinds.iekf import Iekf
+from kfgen.filters.kinds.steady import Steady
 from kfgen.filters.order import best_order
-from kfgen.filters.rolled_full import RolledFull
-from kfgen.filters.rolled_sqrt import RolledSqrt
-from kfgen.filters.rolled_ud import RolledUD
-from kfgen.filters.second import Ekf2
-from kfgen.filters.sensor import SensorCode
-from kfgen.filters.shared import unused
-from kfgen.filters.sqrt import Sqrt
-from kfgen.filters.steady import Steady
-from kfgen.filters.ud import UD
-from kfgen.filters.ukf import Ukf
+from kfgen.filters.sigma.ukf import Ukf
+from kfgen.filters.steps import process
+from kfgen.filters.steps.sensor import SensorCode
 from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import roots, walk
 from kfgen.ir.trace import Trace

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from kfgen.filters import process
 from kfgen.filters.base import FilterCode
-from kfgen.filters.process import Step
-from kfgen.filters.sensor import SensorCode, total
+from kfgen.filters.steps import process
+from kfgen.filters.steps.process import Step
+from kfgen.filters.steps.sensor import SensorCode, total
 from kfgen.fixed.cells import find_arrays
 from kfgen.fixed.random import Random
 from kfgen.fixed.real import HUGE, Memory, Ranges, RealProgram

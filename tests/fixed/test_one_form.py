@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from kfgen.filters.build import build_filter
-from kfgen.filters.shared import _Key
+from kfgen.filters.frame.shared import _Key
 from kfgen.fixed.scalar import Fixed
 from kfgen.generate import UNROLLED, build
 from kfgen.ir.schedule import RESERVED

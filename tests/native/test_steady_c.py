@@ -1,6 +1,6 @@
 """gain: steady in the emitted C: the gain of the Riccati equation, and nothing else.
 
-A wrong gain is the solver's (kfgen.filters.riccati); a wrong x with the right gain is the emitter's.
+A wrong gain is the solver's (kfgen.filters.algebra.riccati); a wrong x with the right gain is the emitter's.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kfgen.filters import linalg
-from kfgen.filters.linalg import Measurement
-from kfgen.filters.symmetric import Symmetric
+from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.linalg import Measurement
+from kfgen.filters.algebra.symmetric import Symmetric
 
 TYPES = [float, np.float64]
 

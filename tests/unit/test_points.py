@@ -8,10 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from kfgen.filters import linalg
-from kfgen.filters.gather import cholesky, columns_of, root_of_factors
-from kfgen.filters.points import PointSet, point_set
-from kfgen.filters.sqrt import Sqrt
+from kfgen.filters.algebra import linalg
+from kfgen.filters.covariance.gather import cholesky, columns_of, root_of_factors
+from kfgen.filters.covariance.sqrt.straight import Sqrt
+from kfgen.filters.sigma.points import PointSet, point_set
 from kfgen.ir.interpret import Memory, run
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule

@@ -1,0 +1,1 @@
+"""Mathematics over traced or plain numbers; knows nothing of filters."""

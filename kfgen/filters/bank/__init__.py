@@ -1,0 +1,1 @@
+"""Banks of filters: the interacting multiple model."""

@@ -1,0 +1,1 @@
+"""Covariance kept as the upper triangle of P."""

@@ -1,0 +1,192 @@
+"""Covariance kept as the upper triangle of P, column by column."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.linalg import Measurement, Rows, Vector
+from kfgen.filters.algebra.numbers import Number, is_positive, is_zero, select, sqrt
+from kfgen.filters.algebra.symmetric import Symmetric, assembled
+from kfgen.filters.base import Block
+from kfgen.filters.covariance.base import Covariance, GainChange
+from kfgen.filters.covariance.gather import cholesky, factor_columns
+from kfgen.filters.covariance.noise import Additive
+from kfgen.filters.covariance.ud.straight import column
+from kfgen.ir.program import Function
+from kfgen.ir.trace import Array, Trace, Value
+
+
+def packed(i: int, j: int) -> int:
+    """Position of P_ij, i <= j."""
+    return j * (j + 1) // 2 + i
+
+
+class Full:
+    """Layout `full`, with the updates `joseph` and `standard`. A covariance is its rows; only i <= j is used."""
+
+    title = "full"
+    reorders = False
+    rolled = False
+    tables: Mapping[str, tuple[int, ...]] = {}
+    factored = False
+    group = 1
+
+    def __init__(
+        self, n: int, update: str, epsilon: Fraction, sequence: list[int], change: GainChange | None = None
+    ) -> None:
+        self.n = n
+        self.order = list(range(n))
+        self.form = update
+        self.change = change
+        self.epsilon = epsilon
+        # After a prediction the columns are computed and stored in an order that keeps together what the model
+        # couples: few entries of the old P are then still needed when they are overwritten.
+        self.sequence = sequence
+
+    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
+        flat = tuple(P0[i][j] for j in range(self.n) for i in range(j + 1))
+        return [Block("P", len(flat), "covariance, upper triangle column by column", initial=flat)]
+
+    def load(self, t: Trace) -> Symmetric:
+        return Symmetric(self.n, lambda i, j: t.element("kf.P", packed(i, j)))
+
+    def predict(self, t: Trace, P: Symmetric, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Symmetric:
+        """F P F^T + Q + sum of d w w^T over the noise columns (w, d)."""
+        additive = Q.entries()
+        t.section("P = F P F^T + Q: the diagonal first, for the guards")
+
+        def with_noise(i: int, j: int, p: Value) -> Value:
+            if not is_zero(additive[i][j]):
+                p = p + additive[i][j]
+            for w, d in noise:
+                if not is_zero(w[i]) and not is_zero(w[j]):
+                    p = p + w[i] * d * w[j]
+            return p
+
+        return P.congruent(F).changed(with_noise)
+
+    def update(self, t: Trace, P: Symmetric, measurements: list[Measurement]) -> tuple[Symmetric, Rows, Vector]:
+        """Scalar measurements one after another: P, the gains (m, n) and the innovation variances (m,)."""
+        gains, s = [], []
+        for measurement in measurements:
+            h, r = measurement.h, measurement.r
+            c = P.times(h)
+            variance = linalg.times(measurement.g, linalg.dot(h, c)) + r
+            K = linalg.quotients(c, variance, r)
+            if self.change is not None:
+                K = self.change(K)
+            if self.form == "joseph":
+                P = P.joseph(measurement, c, K, changed=self.change is not None)
+            else:
+                P = P.downdated(measurement, c, K)
+            if not is_positive(r):
+                P = self._clamped(t, P, measurement, K, c)
+            gains.append(K)
+            s.append(variance)
+        return P, gains, s
+
+    def entries(self, P: Symmetric) -> Symmetric:
+        return P
+
+    def variance(self, P: Symmetric, h: Vector) -> Number:
+        return linalg.dot(h, P.times(h))
+
+    def inflated(self, P: Symmetric, a: Number) -> Symmetric:
+        return P.changed(lambda i, j, p: p * a)
+
+    def _clamped(self, t: Trace, P: Symmetric, measurement: Measurement, K: Vector, c: Vector) -> Symmetric:
+        """A variance that an exact measurement took to zero may come out below it by round-off: back to zero."""
+        low = {}
+        for i in range(self.n):
+            if not is_zero(K[i]):
+                old = P[i, i] + linalg.times(measurement.g, K[i]) * c[i]
+                low[i] = (P[i, i] < 0) & (P[i, i] >= -(old * (4 * self.n * self.epsilon)))
+                t.flag(low[i], "REGULARIZED")
+        return P.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p)
+
+    def tolerance(self, P: Symmetric, h: Vector) -> Value | int:
+        """How far below zero h P h^T may come out by round-off."""
+        terms = [(hi * hi * P[i, i]) for i, hi in enumerate(h) if not is_zero(hi)]
+        return sum(terms[1:], terms[0]) * (4 * self.n * self.epsilon) if terms else 0
+
+    def limit(self, t: Trace, P: Symmetric, floors: list[Fraction | None], ceilings: list[Fraction | None]
+              ) -> Symmetric:  # fmt: skip
+        """variance_floor raises P_ii; variance_ceiling scales row and column i down."""
+        low, high, scale = {}, {}, {}
+        for i, floor in enumerate(floors):
+            if floor is not None:
+                low[i] = P[i, i] < floor
+                t.flag(low[i], "REGULARIZED")
+        P = P.changed(lambda i, j, p: select(low[i], floors[i], p) if i == j and i in low else p)
+        for i, ceiling in enumerate(ceilings):
+            if ceiling is not None:
+                high[i] = P[i, i] > ceiling
+                t.flag(high[i], "REGULARIZED")
+                scale[i] = select(high[i], sqrt(ceiling / P[i, i]), 1)
+
+        def bounded(i: int, j: int, p: Value) -> Value:
+            if i == j:
+                return select(high[i], ceilings[i], p) if i in high else p
+            for k in (i, j):
+                p = p * scale[k] if k in scale else p
+            return p
+
+        return P.changed(bounded)
+
+    def evidence(self, P: Symmetric, after_predict: bool) -> list[Value]:
+        """The diagonal: |P_ij| <= max(P_ii, P_jj), and its products bound those off the diagonal.
+
+        A standard update needs none beside x: c_i^2 / s <= P_ii (Cauchy and Schwarz) is finite where P was.
+        """
+        return [P[i, i] for i in range(self.n)] if after_predict or self.form == "joseph" else []
+
+    def store(self, t: Trace, P: Symmetric, names: list[str], after_predict: bool) -> None:
+        for last, j in enumerate(self.sequence if after_predict else range(self.n)):
+            for i in self.sequence[: last + 1] if after_predict else range(j + 1):
+                low, high = min(i, j), max(i, j)
+                t.store("kf.P", packed(low, high), t.name(t.value(P[low, high]), f"p_{names[low]}_{names[high]}"))
+
+    def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
+        return assembled(U, D)
+
+    def factors(self, P: Symmetric) -> tuple[Rows, Vector]:
+        dense = [[P[min(i, j), max(i, j)] for j in range(self.n)] for i in range(self.n)]
+        return linalg.udu_computed(dense, self.n * self.epsilon)
+
+    def columns(self, P: Symmetric) -> list[tuple[Vector, Number]]:
+        return factor_columns(*self.factors(P))
+
+    def root(self, P: Symmetric, tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
+        S, failures = cholesky(lambda i, j: P[i, j], self.n, tolerance)
+        return [[S[i][j] for i in range(self.n)] for j in range(self.n)], failures
+
+    def downdated(
+        self, t: Trace, P: Symmetric, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Covariance
+    ) -> tuple[Symmetric, Value]:
+        inverse = 1 / s
+        K = [linalg.times(x, inverse) for x in c]
+        after = P.changed(lambda i, j, p: linalg.minus(p, linalg.times(K[i], c[j])))
+        if sure:
+            return after, t.wrapped(t.pool.boolean(False))
+        low = {i: after[i, i] < 0 for i in range(self.n) if not is_zero(c[i])}
+        failed: Value = t.wrapped(t.pool.boolean(False))
+        for i, negative in low.items():
+            failed = failed | (after[i, i] < -(P[i, i] * (1024 * tolerance)))  # the points' rounding is in c
+            t.flag(negative, "REGULARIZED")
+        return after.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p), failed
+
+    def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
+        return []
+
+    # covariance in and out, as loops -------------------------------------------------------------------
+
+    def get(self, t: Trace, i: Value, j: Value) -> Value:
+        """P_ij for counters i <= j."""
+        return t.element("kf.P", column(j) + i)
+
+    def put(self, t: Trace, P: Array, factors: Array) -> None:
+        """Store a covariance (upper triangle column by column) whose factors are known to be positive."""
+        with t.loop("k", 0, self.n * (self.n + 1) // 2) as k:
+            t.store("kf.P", k, P[k])

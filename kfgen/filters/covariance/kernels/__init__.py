@@ -1,0 +1,1 @@
+"""The private functions that the loops of all covariance forms call."""

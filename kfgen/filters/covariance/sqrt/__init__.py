@@ -1,0 +1,1 @@
+"""Covariance kept as its lower Cholesky factor."""

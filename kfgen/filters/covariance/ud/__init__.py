@@ -1,0 +1,1 @@
+"""Covariance kept as U D U^T."""

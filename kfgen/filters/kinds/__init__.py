@@ -1,0 +1,1 @@
+"""The filters that linearise: each reads as its book page."""

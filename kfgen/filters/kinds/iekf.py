@@ -1,0 +1,52 @@
+"""The iterated extended Kalman filter: Gauss-Newton steps of the update (Bell & Cathey 1993)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+from kfgen.filters.algebra.linalg import dot, plus
+from kfgen.filters.algebra.numbers import is_zero
+from kfgen.filters.kinds.ekf import Ekf, Update
+from kfgen.filters.steps.phases import Judged, Made
+from kfgen.filters.steps.sensor import Innovation
+from kfgen.filters.steps.sequence import Updated
+
+
+class Iekf(Ekf):
+    """x_i+1 = x^- + K_i (y_i - H_i (x^- - x_i)) from x_0 = x^- on; P from the last H, R and K."""
+
+    title = "Iterated extended Kalman filter"
+
+    def description(self) -> str:
+        return f"{super().description()}, {self.model.spec.filter.iterations} linearisations"
+
+    def final(self, u: Update, innovation: Innovation, plain: Updated) -> Generator[Judged | Made, None, Updated]:
+        iterations = self.model.spec.filter.iterations or 1
+        if iterations == 1:
+            return (yield from super().final(u, innovation, plain))
+        yield from self.judged(u, innovation, plain)
+        result = self.made(u, innovation, plain)
+        for k in range(2, iterations + 1):
+            u.t.section(f"linearisation {k} of {iterations}")
+            result = self._step(u, result)
+        return result
+
+    def _step(self, u: Update, before: Updated) -> Updated:
+        """The linear update about x^- + before.moved."""
+        t, model = u.t, self.model
+        x = list(u.x)
+        moved = list(before.moved)  # x_i - x^-
+        for place, (i, m) in enumerate(zip(self.order, before.moved, strict=True)):
+            if is_zero(m):
+                continue
+            period = model.periods[i]
+            x[i] = u.x[i] + m
+            if period is not None:
+                x[i] = t.wrap(x[i], period)
+                moved[place] = t.wrap(x[i] - u.x[i], period)
+            t.name(x[i], f"{model.states[i]}_iterate")
+        linear = u.code.linearise(x)
+        y = [t.value(plus(v, dot(h, moved))) for v, h in zip(linear.y, linear.H, strict=True)]
+        innovation = self.innovation(u, replace(linear, y=y))
+        return self.sequence(u, innovation, plain=False)

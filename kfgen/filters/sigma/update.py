@@ -1,0 +1,274 @@
+"""The update of a sigma-point filter: what the points predict of a measurement, and what the state learns of it.
+
+The whole vector at once: S = L D L^T in the order of the components; with the columns c_k of Pxz L^-T and the
+entries nu_k of L^-1 y, x += sum c_k nu_k / d_k and P -= sum c_k c_k^T / d_k. Sequential: H = Pxz^T P^-1, and then
+component by component as in an ekf.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, cast
+
+from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.linalg import Rows, Vector, plus, times
+from kfgen.filters.algebra.numbers import (
+    assume_nonnegative,
+    assume_positive,
+    is_positive,
+    is_zero,
+    reciprocal,
+    require_nonnegative,
+    select,
+    sqrt,
+)  # fmt: skip
+from kfgen.filters.algebra.symmetric import Symmetric
+from kfgen.filters.covariance.base import Covariance
+from kfgen.filters.covariance.full.loops import RolledFull
+from kfgen.filters.covariance.gather import indefinite
+from kfgen.filters.frame import guards
+from kfgen.filters.kinds.ekf import Update
+from kfgen.filters.sigma.gathered import definite
+from kfgen.filters.sigma.seeing import Seeing, Seen
+from kfgen.filters.steps.gate import chi2_threshold
+from kfgen.filters.steps.phases import Judged, Made, Phases
+from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated
+from kfgen.filters.steps.sequence import Updated
+from kfgen.ir.trace import Array, Trace, Value
+from kfgen.model.model import SensorModel
+from kfgen.quantiles import log_two_pi
+
+if TYPE_CHECKING:
+    from kfgen.filters.sigma.ukf import Ukf
+
+
+@dataclass(frozen=True)
+class Factored:
+    """S = L D L^T and what belongs to it: nu = L^-1 y, the columns of Pxz L^-T (m, n), 1 / D or 0, D or 1."""
+
+    nu: Vector
+    columns: list[Vector]
+    inverse: Vector
+    D: Vector
+    some: list[Value | None]  # whether D counts; None: it does
+    failures: list[Value]
+    nis: Value
+
+
+def factored(
+    t: Trace, names: list[str], y: Vector, S: Rows, cross: Rows, sure: bool, tolerance: Fraction, noise: Vector
+) -> Factored:
+    """sure: every pivot is known to be positive, but for what a guard finds. noise: what rounding may leave of each
+    variance (m,)."""
+    m, n = len(y), len(cross)
+    rest = [list(row) for row in S]
+    nu = list(y)
+    columns: list[Vector] = [[cross[i][a] for i in range(n)] for a in range(m)]
+    D: Vector = []
+    inverse: Vector = []
+    some: list[Value | None] = []
+    failures: list[Value] = []
+    nis: Value = t.zero
+    for j in range(m):
+        pivot = t.name(rest[j][j], f"s_{names[j]}")
+        counts: Value | None = None
+        if sure:
+            failures.append(~(pivot > 0))
+            inverse.append(1 / assume_positive(pivot))
+            D.append(pivot)
+        else:
+            limit = S[j][j] * (tolerance * m) + noise[j]
+            failures.append(~(pivot >= -limit))
+            counts = (pivot > limit) & (pivot > 0)
+            inverse.append(select(counts, 1 / pivot, 0))
+            D.append(assume_positive(select(counts, pivot, 1)))
+            columns[j] = [select(counts, c, 0) for c in columns[j]]
+        some.append(counts)
+        for i in range(j + 1, m):
+            factor = rest[j][i] * inverse[j]
+            for k in range(i, m):
+                rest[i][k] = rest[i][k] - factor * rest[j][k]
+            nu[i] = nu[i] - factor * nu[j]
+            columns[i] = [linalg.minus(c, times(factor, b)) for c, b in zip(columns[i], columns[j], strict=True)]
+        nis = nis + nu[j] * (nu[j] * inverse[j])
+    return Factored(nu, columns, inverse, D, some, failures, nis)
+
+
+def whole_vector(
+    ukf: Ukf, seeing: Seeing, t: Trace, sensor: SensorModel, used: list[Value] | None
+) -> Phases:
+    """The update of a sensor by the whole vector."""
+    model, layout = ukf.model, ukf.layout
+    t.section("innovation")
+    code = SensorCode(t, model, sensor, ukf.order, skipped=seeing.carried)
+    u = Update(t, sensor, code, code.prior(), layout, used, ukf.adapted_R(sensor))
+    failures: list[Value] = []
+    array = out = None
+    if seeing.linear:
+        seen = seeing.analytic(u)
+    else:
+        out, array, failures = seeing.look(ukf, u)
+        seen = seeing.read(t, out)
+    linear = code.linearise(u.x)
+    work = _Whole(ukf, u, seeing, linear, seen)
+    t.section("its covariance S = L D L^T")
+    first = work.factored(seen, made=model.options.inflation is None)
+    nis = t.name(first.nis, "nis")
+    t.section("guards")
+    sound = [*work.y(seen), *first.D, *u.tested, *(v for row in work.R for v in row)]
+    guards.finite(t, [*sound, nis] if sensor.gate is None else sound)
+    guards.doubts(t, [v for row in linear.R for v in row])
+    guards.positive(t, [*failures, *first.failures])
+    yield Judged(nis)
+    P = u.P
+    final = first
+    if model.options.inflation is not None:
+        P, final = work.inflated(seen, first, array, out)
+    t.section("gain and covariance")
+    prior = P
+    failed: list[Value] = [] if final is first else list(final.failures)
+    sure = work.sure
+    moved: Vector = [0] * ukf.n
+    likelihood: Value = t.zero
+    for j in range(seeing.m):
+        c = [final.columns[j][place] for place in ukf.order]
+        P, bad = layout.downdated(t, P, c, final.D[j], ukf.tolerance, sure, prior)
+        if not work.definite:  # else it can only be round-off, and has been taken for zero
+            failed.append(bad)
+        step = final.nu[j] * final.inverse[j]
+        moved = [plus(a, times(b, step)) for a, b in zip(moved, c, strict=True)]
+        term = final.nu[j] * step + t.function("log", final.D[j]) + t.value(log_two_pi())
+        counts = final.some[j]
+        if used is not None:
+            counts = used[j] if counts is None else counts & used[j]
+        likelihood = likelihood + (term if counts is None else t.select(counts, term, 0))
+    t.section("state")
+    x = ukf.moved(u, moved)
+    evidence = ukf.unconfined(x) + layout.evidence(P, after_predict=False)
+    P = ukf.limited(t, P)
+    x = ukf.state.confined(t, x)
+    t.section("guards")
+    guards.finite(t, [nis, *x, *evidence])
+    rolled = layout.rolled and not layout.factored
+    if not layout.factored and not rolled and not work.definite:
+        failed += indefinite(P, ukf.n * ukf.scalar.epsilon)
+    guards.positive(t, failed)
+    if rolled and not work.definite:
+        P = definite(cast(RolledFull, layout), P, ukf.n * ukf.scalar.epsilon)
+    log_likelihood = likelihood * Fraction(-1, 2)
+    learnt = ukf.prepared(u, x, P, Updated(moved, P, nis, list(final.D), [], log_likelihood, []))
+    yield Made(x, P, nis, log_likelihood)
+    ukf.store_update(u, x, P, learnt)
+
+
+class _Whole:
+    """The pieces of a whole-vector update that are made twice where P is inflated."""
+
+    def __init__(self, ukf: Ukf, u: Update, seeing: Seeing, linear: Linearised, seen: Seen) -> None:
+        self.ukf = ukf
+        self.u = u
+        self.seeing = seeing
+        m = seeing.m
+        R: Rows = linear.R
+        if u.adapted is not None:
+            adapted = u.adapted.adapted(u.t, seen.spread, u.used)
+            R = [[adapted[i, j] for j in range(m)] for i in range(m)]
+        self.R: Rows = [[R[i][j] + linear.added[i][j] for j in range(m)] for i in range(m)]
+        if u.adapted is None and any(r.constant is None for row in self.R for r in row):
+            for d in decorrelated(u.t, linear, self.R).variances:
+                require_nonnegative(d, "R is not positive semidefinite")
+        diagonal = all(is_zero(self.R[i][j]) for i in range(m) for j in range(m) if i != j)
+        self.definite = seeing.points.positive and seeing.points.exact
+        self.sure = diagonal and all(is_positive(self.R[i][i]) for i in range(m)) and self.definite
+
+    def y(self, seen: Seen) -> Vector:
+        """z less its prediction; 0 for components that are not used."""
+        y = self.u.code.residuals(self.u.x, seen.z)
+        if self.u.used is not None:
+            y = [select(b, v, self.u.t.zero) for b, v in zip(self.u.used, y, strict=True)]
+        return y
+
+    def spread(self, seen: Seen) -> Rows:
+        """Pzz; 0 for components that are not used."""
+        m, used = self.seeing.m, self.u.used
+        if used is None:
+            return [[seen.spread[i, j] for j in range(m)] for i in range(m)]
+        return [[select(used[i] & used[j], seen.spread[i, j], self.u.t.zero) for j in range(m)] for i in range(m)]
+
+    def factored(self, seen: Seen, made: bool = True) -> Factored:
+        """made: whether the update is made of it, so that a floor is flagged."""
+        t, used, m = self.u.t, self.u.used, self.seeing.m
+        spread, R, cross = self.spread(seen), self.R, seen.cross
+        if used is not None:
+            R = [[select(used[i] & used[j], R[i][j], t.one if i == j else t.zero) for j in range(m)] for i in range(m)]
+            cross = [[c if is_zero(c) else select(b, c, t.zero) for b, c in zip(used, row, strict=True)]
+                     for row in cross]  # fmt: skip
+        S = [[spread[i][j] + R[i][j] for j in range(m)] for i in range(m)]
+        floor = self.ukf.model.options.innovation_floor
+        if floor is not None:
+            for i in range(m):
+                low = S[i][i] < floor if used is None else (S[i][i] < floor) & used[i]
+                if made:
+                    t.flag(low, "REGULARIZED")
+                S[i][i] = select(low, t.value(floor), S[i][i])
+        names = [c.name for c in self.seeing.sensor.spec.components]
+        epsilon = self.ukf.scalar.epsilon
+        # points differ from each other by the rounding of what h is made of, if by nothing else
+        total = sum(abs(w) for w in self.seeing.points.wc) * (32 * epsilon) ** 2
+        noise: Vector = [0 if self.sure or self.seeing.linear else z * z * total for z in seen.z]
+        return factored(t, names, self.y(seen), S, cross, self.sure, 8 * epsilon, noise)
+
+    def inflated(
+        self, seen: Seen, first: Factored, array: Array | None, out: Array | None
+    ) -> tuple[Covariance, Factored]:
+        """P <- (1 + a) P where the innovation fails its test, and all that follows from it."""
+        t, u, seeing = self.u.t, self.u, self.seeing
+        inflation = self.ukf.model.options.inflation
+        assert inflation is not None
+        t.section("adaptive: is the innovation within its quantile?")
+        threshold = inflation.threshold
+        limit = chi2_threshold(t, inflation.probability, seeing.m, u.used) if threshold is None else t.value(threshold)
+        known = Fraction(1, 10**12) if self.ukf.scalar.name == "double" else Fraction(1, 10**6)
+        terms = _known_squares(t, self.y(seen), self.spread(seen), first.D, first.some, known)
+        fails = t.name(first.nis > limit, "anomaly")
+        t.flag(fails, "ANOMALY")
+        a = terms * (1 / limit - reciprocal(assume_nonnegative(first.nis))[1])
+        factor = assume_positive(t.name(select(fails, 1 + a, t.one), "inflation"))
+        P = self.ukf.layout.inflated(u.P, factor)
+        if array is None or out is None:
+            m = seeing.m
+            again = Seen(seen.z, Symmetric(m, lambda i, j: seen.spread[i, j] * factor),
+                         [[times(c, factor) for c in row] for row in seen.cross], [])  # fmt: skip
+            return P, self.factored(again)
+        root = t.name(sqrt(factor), "root_inflation")
+        with t.when(fails):
+            if seeing.kept is not None:
+                guards.positive(t, seeing.redraw(self.ukf, u, array))
+            with t.loop("k", 0, len(seeing.points.rows)) as k:
+                for i in range(seeing.n):
+                    array[k * seeing.stride + i] = array[k * seeing.stride + i] * root
+            seeing.run(u, out, array)
+        return P, self.factored(seeing.read(t, out))
+
+
+def _known_squares(t: Trace, y: Vector, S: Rows, D: Vector, some: list[Value | None], known: Fraction) -> Value:
+    """y^T S^-1 y over the pivots of S that are above `known` of the entries of D."""
+    m = len(y)
+    rest = [list(row) for row in S]
+    nu = list(y)
+    total: Value = t.zero
+    for j in range(m):
+        pivot = rest[j][j]
+        counts = pivot > D[j] * known
+        choice = some[j]
+        if choice is not None:
+            counts = counts & choice
+        inverse = select(counts, 1 / pivot, 0)
+        for i in range(j + 1, m):
+            factor = rest[j][i] * inverse
+            for k in range(i, m):
+                rest[i][k] = rest[i][k] - factor * rest[j][k]
+            nu[i] = nu[i] - factor * nu[j]
+        total = total + nu[j] * (nu[j] * inverse)
+    return total

@@ -1,0 +1,1 @@
+"""What a step of any filter is made of."""

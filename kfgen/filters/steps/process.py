@@ -1,0 +1,238 @@
+"""The time step of a model, traced: f, its Jacobians, the process noise; discrete, or by an integrator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.dual import Dual, Evaluator, seeds
+from kfgen.filters.algebra.exact import discretise
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.numbers import assume_positive, is_zero, require_nonnegative
+from kfgen.ir.trace import Trace, Value
+from kfgen.model import Model
+
+NEGATIVE = "a noise variance is negative"
+
+
+@dataclass(frozen=True)
+class Step:
+    """The step's length; `raw` is what the caller gave."""
+
+    dt: Value | None
+    raw: Value | None = None
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What f may use, at the start of the step."""
+
+    x: list[Value]
+    duals: dict[str, Dual]
+
+
+@dataclass(frozen=True)
+class Advance:
+    """x (n), F (n, n), Q (n, n) and the noise columns (w, d): P <- F P F^T + Q + sum d w w^T. Spec's order.
+
+    after: x with its derivatives. added: what of Q comes from noise densities.
+    """
+
+    x: list[Value]
+    F: Rows
+    Q: Rows
+    noise: list[tuple[Vector, Value]]
+    after: list[Dual]
+    added: Rows | None = None
+
+
+def step_length(t: Trace, model: Model) -> Step:
+    """dt: compiled in, or the argument, tested and clamped."""
+    if model.dt is not None:
+        return Step(t.value(model.dt))
+    if model.spec.dt is None:
+        return Step(None)
+    low, high = model.dt_limits
+    raw = t.field("dt")
+    t.guard(~t.finite(raw), "NOT_FINITE")
+    step = raw
+    if low is None:
+        t.guard(raw <= 0, "NOT_POSITIVE")
+    else:
+        t.flag(raw < low, "DT_CLAMPED")
+        step = t.select(raw < low, t.value(low), step)
+    if high is not None:
+        t.flag(raw > high, "DT_CLAMPED")
+        step = t.select(raw > high, t.value(high), step)
+    if step is not raw:
+        t.name(step, "step")
+    if low is None or low > 0:
+        assume_positive(step)
+    return Step(step, raw)
+
+
+def parameters_and_inputs(t: Trace, model: Model, inputs: bool = True) -> dict[str, Dual]:
+    out = {name: Dual(t.field(f"kf.parameters.{name}")) for name, _ in model.parameters}
+    if inputs:
+        out.update({name: Dual(t.field(f"u.{name}")) for name in model.inputs})
+    return out
+
+
+def time_now(t: Trace, model: Model) -> Dual:
+    """t, seconds since init: a step count where dt is fixed, a compensated sum where it is not."""
+    if model.dt is not None or model.spec.dt is None:
+        count = t.wrapped(t.pool.make("real", (t.pool.make("field", (), "kf.steps", "int"),)))
+        return Dual(count * (model.dt if model.dt is not None else 1))
+    return Dual(t.field("kf.t"))
+
+
+def given(t: Trace, model: Model, step: Step) -> Prior:
+    """Values and seeds of all that f may use; noises are at their mean, 0."""
+    x = [t.element("kf.x", i) for i in range(len(model.states))]
+    duals = seeds(t, dict(zip(model.states, x, strict=True)))
+    used = model.uses(*model.dynamics_expressions())
+    for name, value in zip(model.states, x, strict=True):
+        if name in used:
+            t.name(value, name)
+    duals.update(seeds(t, {w.name: t.zero for w in model.noises}))
+    duals.update(parameters_and_inputs(t, model))
+    if model.uses_time():
+        duals["t"] = time_now(t, model)
+    if step.dt is not None:
+        duals["dt"] = Dual(step.dt)
+    return Prior(x, duals)
+
+
+def advance(
+    t: Trace, model: Model, prior: Prior, step: Step, additive: Rows | None = None, derivatives: int = 1,
+    carried: tuple[str, ...] = (),
+) -> Advance:
+    """One step of the model from the prior. additive: what stands for the Q of the spec (n, n).
+
+    derivatives: 2 has `after` carry second derivatives too. carried: noise inputs that are accounted for otherwise.
+    """
+    n = len(model.states)
+    at_prior = Evaluator(t, model, prior.duals, derivatives)
+    Q = [[at_prior.value(e) for e in row] for row in model.Q] if additive is None else additive
+    added: Rows | None = None
+    held = [w.name for w in model.noises if not w.density]
+    dense = [w.name for w in model.noises if w.density]
+    extra: list[tuple[Vector, Value]] = []
+    Qw = [[at_prior.value(e) for e in row] for row in model.noise_covariance]
+    if model.spec.dynamics.form == "discrete":
+        after = [at_prior(e) for e in model.f]
+    else:
+        assert step.dt is not None
+        if model.spec.dynamics.integrator == "exact":
+            linear = discretise(model)
+            after = linear.advance(t, at_prior, prior.duals, step.dt)
+            index = [i for i, w in enumerate(model.noises) if w.density]
+            added, extra = linear.noise(t, at_prior, [[Qw[i][j] for j in index] for i in index], step.dt)
+            Q = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(Q, added, strict=True)]
+        else:
+            after = _integrate(t, model, prior, step.dt, held, derivatives)
+            rates = [at_prior(e) for e in model.f]
+            extra = _columns(t, model, rates, dense, Qw, step.dt)
+    F = [[d.gradient.get(name, t.zero) for name in model.states] for d in after]
+    noise = _columns(t, model, after, [w for w in held if w not in carried], Qw, None) + extra
+    assert len(F) == n
+    return Advance([d.value for d in after], F, Q, noise, after, added)
+
+
+def moved(t: Trace, model: Model, duals: dict[str, Dual], dt: Value | None) -> list[Value]:
+    """x after a step from given values of all that f uses, noise inputs included."""
+    prior = Prior([duals[name].value for name in model.states], duals)
+    if model.spec.dynamics.form == "discrete":
+        evaluator = Evaluator(t, model, duals)
+        return [evaluator.value(e) for e in model.f]
+    assert dt is not None
+    if model.spec.dynamics.integrator == "exact":
+        after = discretise(model).advance(t, Evaluator(t, model, duals), duals, dt)
+    else:
+        after = _integrate(t, model, prior, dt, [w.name for w in model.noises if not w.density], 1)
+    return [d.value for d in after]
+
+
+def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Rows, dt: Value | None
+             ) -> list[tuple[Vector, Value]]:  # fmt: skip
+    """G Qw G^T as columns, Qw factored where it is not diagonal; times dt for a density."""
+    index = [i for i, w in enumerate(model.noises) if w.name in names]
+    if not index:
+        return []
+    part = [[Qw[i][j] for j in index] for i in index]
+    q = len(index)
+    G = [[d.gradient.get(model.noises[i].name, t.zero) for i in index] for d in after]
+    if all(is_zero(part[i][j]) for i in range(q) for j in range(q) if i != j):
+        weights = [part[i][i] for i in range(q)]
+    else:
+        U, weights = linalg.udu(part)
+        for d in weights:
+            require_nonnegative(d, NEGATIVE)
+        G = [
+            [linalg.dot([row[k] for k in range(j + 1)], [*[U[k][j] for k in range(j)], 1]) for j in range(q)]
+            for row in G
+        ]
+        G = [[t.value(g) for g in row] for row in G]
+    columns = []
+    for j, weight in enumerate(weights):
+        column = [row[j] for row in G]
+        weight = t.value(weight)
+        if not is_zero(weight) and not all(is_zero(g) for g in column):
+            require_nonnegative(weight, NEGATIVE)
+            columns.append((column, weight if dt is None else weight * dt))
+    return columns
+
+
+def _integrate(
+    t: Trace, model: Model, prior: Prior, dt: Value, held: list[str], derivatives: int
+) -> list[Dual]:
+    """euler, midpoint or rk4 with substeps; t, dt, inputs and noises are held over the step.
+
+    Derivatives are carried through the stages, so F and G are those of the integrator itself.
+    """
+    dynamics = model.spec.dynamics
+    h = dt * Fraction(1, dynamics.substeps)
+    constant = {name: d for name, d in prior.duals.items() if name not in model.states}
+    for w in model.noises:
+        if w.name not in held:
+            constant[w.name] = Dual(t.zero)
+    moving = [i for i, e in enumerate(model.f) if e != 0]
+
+    def rate(x: list[Dual]) -> list[Dual]:
+        evaluator = Evaluator(t, model, {**constant, **dict(zip(model.states, x, strict=True))}, derivatives)
+        return [evaluator(e) for e in model.f]
+
+    def shifted(x: list[Dual], k: list[Dual], length: Value) -> list[Dual]:
+        return [a + b.scaled(length) if i in moving else a for i, (a, b) in enumerate(zip(x, k, strict=True))]
+
+    x = [prior.duals[name] for name in model.states]
+    for _ in range(dynamics.substeps):
+        k1 = rate(x)
+        if dynamics.integrator == "euler":
+            x = shifted(x, k1, h)
+        elif dynamics.integrator == "midpoint":
+            x = shifted(x, rate(shifted(x, k1, h * Fraction(1, 2))), h)
+        else:
+            k2 = rate(shifted(x, k1, h * Fraction(1, 2)))
+            k3 = rate(shifted(x, k2, h * Fraction(1, 2)))
+            k4 = rate(shifted(x, k3, h))
+            total = [a + (b + c).scaled(2) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+            x = shifted(x, total, h * Fraction(1, 6))
+    return x
+
+
+def store_time(t: Trace, model: Model, step: Step) -> None:
+    """Advance t by the step: Kahan's compensated sum where dt is given at run time."""
+    if not model.uses_time():
+        return
+    if model.dt is not None or model.spec.dt is None:
+        count = t.pool.make("field", (), "kf.steps", "int")
+        t.store("kf.steps", None, t.wrapped(t.pool.add(count, t.pool.integer(1))))
+        return
+    assert step.dt is not None
+    before = t.field("kf.t")
+    term = t.name(step.dt - t.field("kf.t_lost"), "t_term")
+    after = t.name(before + term, "t_next")
+    t.store("kf.t_lost", None, (after - before) - term)
+    t.store("kf.t", None, after)

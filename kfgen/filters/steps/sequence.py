@@ -1,0 +1,201 @@
+"""The measurement update, one scalar measurement after another (Bierman 1977, ch. V).
+
+The innovation of each is corrected by what the earlier ones have already moved, so that the result is that of the
+whole vector. Robust and adaptive updates, floors of the innovation variance and changed gains act on each scalar.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.linalg import Measurement, Vector
+from kfgen.filters.algebra.numbers import assume_positive, is_positive, is_zero, reciprocal, select
+from kfgen.filters.covariance.base import Covariance, Layout
+from kfgen.filters.covariance.looped import Displacement, displaced
+from kfgen.filters.steps.influence import weigh
+from kfgen.filters.steps.sensor import Innovation
+from kfgen.ir.trace import Trace, Value
+from kfgen.model import Model
+from kfgen.quantiles import chi2_quantile, log_two_pi
+
+
+@dataclass(frozen=True)
+class Updated:
+    """After all components, in the filter's inner order.
+
+    moved: x - prior (n,). steps: K_i nu_i of each scalar. s: innovation variances. failures: conditions under
+    which an innovation variance is negative beyond round-off.
+    """
+
+    moved: Vector
+    P: Covariance
+    nis: Value
+    s: list[Value]
+    failures: list[Value]
+    log_likelihood: Value
+    steps: list[Vector]
+
+
+def departs(model: Model) -> bool:
+    """Whether the update that is made differs from the textbook's, by which the gate and nis judge."""
+    options = model.options
+    changed = options.gain_limit is not None or bool(options.consider)
+    return changed or options.influence is not None or options.inflation is not None
+
+
+class Sequence:
+    """Updates of a layout by the components of a sensor.
+
+    plain: the textbook's, without robust, adaptive and changed gains.
+    """
+
+    def __init__(
+        self, t: Trace, model: Model, layout: Layout, names: list[str], plain: bool, epsilon: Fraction
+    ) -> None:
+        self.t = t
+        self.epsilon = epsilon
+        self.model = model
+        self.layout = layout
+        if plain and layout.change is not None:
+            self.layout = copy(layout)
+            self.layout.change = None
+        self.names = names
+        self.plain = plain
+        options = model.options
+        self.influence = None if plain else options.influence
+        self.inflation = None if plain else options.inflation
+        self.floor = options.innovation_floor
+        self.singly = self.influence is not None or self.inflation is not None or self.floor is not None
+        self.threshold: Fraction | None = None
+        if self.inflation is not None:
+            self.threshold = self.inflation.threshold or chi2_quantile(self.inflation.probability, 1)
+
+    def run(self, P: Covariance, innovation: Innovation) -> Updated:
+        """All components in order; P stays as it is."""
+        t, layout = self.t, self.layout
+        rows, variances, y = innovation.rows, innovation.variances, innovation.y
+        moved: Vector = [0] * layout.n
+        nis: Any = 0
+        likelihood: Any = 0  # -2 log
+        every_s: list[Value] = []
+        failures: list[Value] = []
+        steps: list[Vector] = []
+        prior = P  # what rounding leaves is relative to what it was
+        exact = [not is_positive(r) and _several(h) for h, r in zip(rows, variances, strict=True)]
+        singly = self.singly or any(exact)
+        group = 1 if singly else layout.group
+        for first in range(0, len(rows), group):
+            part = range(first, min(first + group, len(rows)))
+            titles = ", ".join(self.names[c] for c in part)
+            t.section("gain and covariance" + (f": {titles}" if len(rows) > 1 else ""))
+            below = [0 if is_positive(variances[c]) else layout.tolerance(prior, rows[c]) for c in part]
+            measurements = [Measurement(rows[c], variances[c]) for c in part]
+            nu: Any = None
+            if singly:
+                nu = self._corrected(y, rows, moved, first)
+                if exact[first]:
+                    measurements = [self._unless_known(P, prior, measurements[0])]
+                used = None if innovation.used is None else innovation.used[first]
+                P, nu, measurement, failed = self._prepared(P, first, nu, measurements[0], used, below[0])
+                measurements = [measurement]
+                failures += failed
+            elif layout.rolled:
+                nu = self._corrected(y, rows, moved, first)
+            if layout.rolled:
+                measurements = [replace(measurements[0], nu=nu, moved=moved)]
+            P, gains, s = layout.update(t, P, measurements)
+            for c, K, variance, low in zip(part, gains, s, below, strict=True):
+                t.name(variance, f"s_{self.names[c]}")
+                if not (singly or layout.rolled):
+                    nu = self._corrected(y, rows, moved, c)
+                step = [linalg.times(k, nu) for k in K]
+                steps.append(step)
+                moved = displaced(moved, K, nu)
+                square = K.square if isinstance(K, Displacement) else None
+                if square is None:
+                    square = nu * (nu * (1 / variance))  # the gain has made the reciprocal
+                sure = is_positive(variances[c]) or self.floor is not None
+                if sure and not (layout.rolled and layout.factored):  # there it is r and squares
+                    failures.append(~(variance > 0))
+                elif sure:
+                    pass
+                else:  # a direction already known, measured exactly: skipped
+                    square = t.select(variance > 0, square, 0)
+                    failures.append(variance < -low)
+                nis = linalg.plus(nis, square)
+                if self.model.spec.code.log_likelihood:
+                    term = square + t.function("log", variance) + t.value(log_two_pi())
+                    term = term if sure else t.select(variance > 0, term, 0)
+                    if innovation.used is not None:
+                        term = t.select(innovation.used[c], term, 0)
+                    likelihood = linalg.plus(likelihood, term)
+                every_s.append(t.value(variance))
+        if self.plain:
+            t.section("state and innovation squared")
+            nis = t.name(nis, "nis")
+        return Updated(moved, P, nis, every_s, failures, t.value(likelihood) * Fraction(-1, 2), steps)
+
+    def _corrected(self, y: Vector, rows: list[Vector], moved: Vector, c: int) -> Value:
+        """y_c less what the components before it have moved."""
+        correction = linalg.dot(rows[c], moved)
+        nu: Value = y[c] if is_zero(correction) else self.t.name(y[c] - correction, f"nu_{self.names[c]}")
+        return nu
+
+    def _prepared(
+        self, P: Covariance, c: int, nu: Value, measurement: Measurement, used: Value | None, below: Value | int
+    ) -> tuple[Covariance, Value, Measurement, list[Value]]:
+        """Robust, then adaptive, then the floor: P, the innovation, the measurement, conditions of failure."""
+        t, floor = self.t, self.floor
+        h, r, name = measurement.h, measurement.r, self.names[c]
+        g: Any = 1
+        if self.influence is not None:
+            nu, g = weigh(t, self.model, self.influence, name, nu, r, used)
+        if self.threshold is None and floor is None:
+            return P, nu, Measurement(h, r, g), []
+        spread = t.value(linalg.times(g, self.layout.variance(P, h)))
+        failed: list[Value] = []
+        if self.threshold is not None:
+            wanted = linalg.times(g, nu * nu) * (1 / self.threshold)  # the s that would just pass the test
+            some, inverse = reciprocal(spread)
+            excess = t.name(wanted - (spread + r), f"excess_{name}")
+            inflate = t.name((excess > 0) & some & self._uncertain(P, h, spread), f"inflate_{name}")
+            t.flag(inflate, "ANOMALY")
+            a = assume_positive(t.name(select(inflate, 1 + excess * inverse, t.one), f"inflation_{name}"))
+            P = self.layout.inflated(P, a)
+            spread = spread * a
+        if floor is not None:
+            low = spread + r < floor
+            if used is not None:
+                low = low & used
+            if not is_positive(r):
+                failed.append(spread + r < -below)
+            if not (self.plain and departs(self.model)):  # that one is judged, not made
+                t.flag(low, "REGULARIZED")
+            r = assume_positive(select(low, floor - spread, r))
+        return P, nu, Measurement(h, r, g), failed
+
+    def _uncertain(self, P: Covariance, h: Vector, spread: Value) -> Value:
+        """Whether h P h^T is more than what rounding leaves of a direction that is known exactly."""
+        if not _several(h):
+            return self.t.wrapped(self.t.pool.boolean(True))
+        dense = self.layout.entries(P)
+        terms = [x * x * dense[i, i] for i, x in enumerate(h) if not is_zero(x)]
+        uncertain: Value = spread > sum(terms[1:], terms[0]) * (8 * self.layout.n * self.epsilon)
+        return uncertain
+
+    def _unless_known(self, P: Covariance, prior: Covariance, measurement: Measurement) -> Measurement:
+        """The measurement, with h = 0 where it says exactly what is known exactly already: it is then skipped."""
+        h, t = measurement.h, self.t
+        spread = t.value(self.layout.variance(P, h))
+        lowest = -t.value(self.layout.tolerance(prior, h))
+        known = ~self._uncertain(prior, h, spread) & (t.value(measurement.r) <= 0) & ~(spread < lowest)
+        return Measurement([x if is_zero(x) else select(known, 0, x) for x in h], measurement.r)
+
+
+def _several(h: Vector) -> bool:
+    """Whether a row measures more than one state."""
+    return sum(1 for x in h if not is_zero(x)) > 1
