@@ -14,8 +14,8 @@ from kfgen.filters.covariance.full.loops import RolledFull
 from kfgen.filters.covariance.looped import Space, integer
 from kfgen.filters.covariance.sqrt.loops import RolledSqrt, Root
 from kfgen.filters.covariance.ud.loops import RolledUD
-from kfgen.filters.covariance.ud.straight import column, triangle
 from kfgen.filters.frame.runs import Put
+from kfgen.filters.frame.triangles import strict_start, upper_start
 from kfgen.ir.trace import Array, Value
 from kfgen.model import Model
 
@@ -138,7 +138,7 @@ class _Mixture:
         with t.loop("j", 0, n) as j:
             scaled = [t.name(t.value(times(array[j], weight)), "part") for array, weight in self.columns]
             with t.loop("i", 0, j + 1) as i:
-                place = column(j) + i
+                place = upper_start(j) + i
                 total: Number = 0
                 for element, weight in parts:
                     total = plus(total, times(weight, element(place)))
@@ -161,7 +161,7 @@ class _Mixture:
 
             def column_of(k: Value, entry: Put, upper: Callable[[int | Value], Value] = upper) -> None:
                 with t.loop("i", 0, k) as i:
-                    entry(i, upper(triangle(k) + i))
+                    entry(i, upper(strict_start(k) + i))
                 entry(k, t.one)
 
             def factor(
@@ -183,7 +183,7 @@ class _Mixture:
             inverse = t.name(reciprocal(assume_nonnegative(d))[1], "inverse")
             D[j] = t.value(times(weight, d * d))
             with t.loop("i", 0, j) as i:
-                U[triangle(j) + i] = 0 if is_zero(weight) else source(layout.spot(t, i, j)) * inverse
+                U[strict_start(j) + i] = 0 if is_zero(weight) else source(layout.spot(t, i, j)) * inverse
         for part in self.others:
             entry_of = self.sources[part].element(t, "kf.S")
 

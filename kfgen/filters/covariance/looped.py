@@ -10,9 +10,9 @@ from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.linalg import Vector
 from kfgen.filters.algebra.numbers import Number, is_positive, is_zero, select
 from kfgen.filters.covariance.base import GainChange, Rolled
-from kfgen.filters.covariance.ud.straight import column
 from kfgen.filters.frame import guards
 from kfgen.filters.frame.runs import put
+from kfgen.filters.frame.triangles import upper_start
 from kfgen.filters.steps.adapt import AdaptedQ
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
@@ -130,7 +130,7 @@ def learnt(t: Trace, layout: Rolled, Q: AdaptedQ, moved: Displacement) -> Callab
     field, n = f"kf.{Q.kept.field}", moved.n
     total = t.variable(t.unique("trace"), 0)
     with t.loop("i", 0, n) as i:
-        value = t.element(field, column(i) + i)
+        value = t.element(field, upper_start(i) + i)
         for gain, step in moved.terms:
             dx = gain[i] * step
             value = value + dx * dx

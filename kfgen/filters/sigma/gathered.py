@@ -15,8 +15,8 @@ from kfgen.filters.covariance.looped import Space, fill
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.sqrt.loops import RolledSqrt, Root
 from kfgen.filters.covariance.ud.loops import Factors, RolledUD
-from kfgen.filters.covariance.ud.straight import column
 from kfgen.filters.frame import guards
+from kfgen.filters.frame.triangles import upper_start
 from kfgen.filters.sigma.points import PointSet
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
@@ -68,7 +68,7 @@ class GatheredEntries:
             d = array[at + j]
             part = t.name(d if self.common is not None else d * weight, "part")
             with t.loop("i", 0, j + 1) as i:
-                place = column(j) + i
+                place = upper_start(j) + i
                 self.sum[place] = self.sum[place] + array[at + i] * part
 
     def subtract_row(self, array: Array, at: Value, weight: Weight) -> None:
@@ -91,7 +91,7 @@ class GatheredEntries:
             with t.loop("j", 0, n) as j:
                 parts = [t.name(t.value(linalg.times(array[j], weight)), "part") for array, weight in arrays]
                 with t.loop("i", 0, j + 1) as i:
-                    place = column(j) + i
+                    place = upper_start(j) + i
                     total = self.sum[place] if self.common is None else self.sum[place] * self.common
                     for (array, _), part in zip(arrays, parts, strict=True):
                         total = total + array[i] * part

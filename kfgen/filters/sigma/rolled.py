@@ -11,7 +11,7 @@ from kfgen.filters.algebra.numbers import assume_nonnegative, is_zero, select, s
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Covariance, Layout
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.ud.straight import column, triangle
+from kfgen.filters.frame.triangles import strict_start, upper_start
 from kfgen.filters.sigma.points import PointSet
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
@@ -42,7 +42,7 @@ def root(t: Trace, layout: Layout, tolerance: Fraction, own: Mapping[str, Array]
         elif layout.reorders:  # U D U^T
             scale = t.name(sqrt(assume_nonnegative(of("kf.D", j))), "scale")
             with t.loop("i", 0, j) as i:
-                out[j * n + i] = of("kf.U", triangle(j) + i) * scale
+                out[j * n + i] = of("kf.U", strict_start(j) + i) * scale
             out[j * n + j] = scale
             with t.loop("i", j + 1, n) as i:
                 out[j * n + i] = 0
@@ -50,14 +50,14 @@ def root(t: Trace, layout: Layout, tolerance: Fraction, own: Mapping[str, Array]
             with t.loop("i", 0, j) as i:
                 out[j * n + i] = 0
             with t.loop("i", j, n) as i:
-                out[j * n + i] = of("kf.S", column(i) + j)
+                out[j * n + i] = of("kf.S", upper_start(i) + j)
     return out
 
 
 def _cholesky_column(t: Trace, n: int, out: Array, j: Value, tolerance: Fraction, of: Element
 ) -> None:  # fmt: skip
     """Column j of the lower root of P, those before it being known."""
-    diagonal = t.name(of("kf.P", column(j) + j), "diagonal")
+    diagonal = t.name(of("kf.P", upper_start(j) + j), "diagonal")
     pivot = t.variable("pivot", diagonal)
     with t.loop("k", 0, j) as k:
         pivot.set(pivot.get() - out[k * n + j] * out[k * n + j])
@@ -68,7 +68,7 @@ def _cholesky_column(t: Trace, n: int, out: Array, j: Value, tolerance: Fraction
     inverse = t.name(select(left > limit, 1 / length, 0), "inverse")
     out[j * n + j] = length
     with t.loop("i", j + 1, n) as i:
-        rest = t.variable("rest", of("kf.P", column(i) + j))
+        rest = t.variable("rest", of("kf.P", upper_start(i) + j))
         with t.loop("k", 0, j) as k:
             rest.set(rest.get() - out[k * n + i] * out[k * n + j])
         out[j * n + i] = rest.get() * inverse
@@ -113,7 +113,7 @@ class Entries:
     def add_row(self, array: Array, at: Value) -> None:
         """+ d d^T of the deviations from `at` on; the common weight comes in at the end."""
         with self.t.loop("j", 0, self.n) as j, self.t.loop("i", 0, j + 1) as i:
-            place = column(j) + i
+            place = upper_start(j) + i
             self.sum[place] = self.sum[place] + array[at + i] * array[at + j]
 
     def add(self, d: Vector, weight: Weight) -> None:
@@ -187,7 +187,7 @@ def absorb(n: int, smallest: Fraction, taken: frozenset[str]) -> Function:
         ratio = t.name(select(some, d / a, 1), "ratio")
         t.store("diagonal", j, a)
         with t.loop("i", 0, j) as i:
-            place = triangle(j) + i
+            place = strict_start(j) + i
             u = t.name(t.element("factor", place), "u")
             w = t.name(t.element("w", i), "w_i")
             t.store("w", i, w - s * u)

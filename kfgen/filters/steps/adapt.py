@@ -13,15 +13,11 @@ from kfgen.filters.algebra.numbers import assume_nonnegative, assume_positive, i
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.noise import Additive, Computed, Factored
+from kfgen.filters.frame.triangles import upper, upper_start
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
-
-
-def packed(i: int, j: int) -> int:
-    """Position of an entry, i <= j, of an upper triangle column by column."""
-    return j * (j + 1) // 2 + i
 
 
 def _constants(matrix: tuple[tuple[object, ...], ...]) -> list[list[Fraction]]:
@@ -68,12 +64,12 @@ class Kept:
         for j in range(self.k):
             for i in range(j + 1):
                 kept = entries[i, j] if factors is None else factors[1][j] if i == j else factors[0][i][j]
-                t.store(f"kf.{self.field}", packed(i, j), t.value(kept))
+                t.store(f"kf.{self.field}", upper(i, j), t.value(kept))
 
     def get(self, t: Trace, i: Value, j: Value) -> Value:
         """An entry for counters i <= j."""
         def at(row: Value, col: Value) -> Value:
-            place = t.wrapped(t.pool.make("half", ((col * (col + 1)).node,), kind="int")) + row
+            place = upper_start(col) + row
             return t.element(f"kf.{self.field}", place)
 
         if not self.factored:
@@ -86,7 +82,7 @@ class Kept:
         return total.get()
 
     def _load(self, t: Trace, i: int, j: int) -> Value:
-        return t.element(f"kf.{self.field}", packed(i, j))
+        return t.element(f"kf.{self.field}", upper(i, j))
 
 
 class AdaptedR:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from kfgen.filters.algebra.numbers import select
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.base import Layout
-from kfgen.filters.covariance.ud.straight import column
+from kfgen.filters.frame.triangles import upper_start
 from kfgen.filters.steps.adapt import Kept
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
@@ -92,7 +92,7 @@ class CovarianceCode:
             elif self.order == list(reversed(range(n))):
                 low, high = b, a
             value = t.name(t.element("P", low * n + high), "value")
-            k = column(j) + i
+            k = upper_start(j) + i
             P[k] = value
             W[k] = value
             t.guard(~t.finite(value), "NOT_FINITE")
@@ -108,7 +108,7 @@ class CovarianceCode:
         n = self.n
         tolerance = n * self.epsilon
         with t.loop("j", 0, n, down=True) as j:
-            jj = column(j)
+            jj = upper_start(j)
             scale = t.name(P[jj + j] * tolerance, "round_off")
             pivot = t.name(W[jj + j], "pivot")
             t.guard(pivot < -scale, "NOT_POSITIVE")
@@ -116,11 +116,11 @@ class CovarianceCode:
             W[jj + j] = d
             with t.loop("i", 0, j, down=True) as i:  # what is above i in column j is still P's
                 rest = t.name(W[jj + i], "rest")
-                allowed = 4 * scale * P[column(i) + i]
+                allowed = 4 * scale * P[upper_start(i) + i]
                 t.guard((d <= 0) & (rest * rest > allowed), "NOT_POSITIVE")
                 u = t.name(select(d > 0, rest / d, 0), "u")
                 with t.loop("k", 0, i + 1) as k:
-                    spot = column(i) + k
+                    spot = upper_start(i) + k
                     W[spot] = W[spot] - u * W[jj + k]
                 W[jj + i] = u
 

@@ -10,7 +10,7 @@ from kfgen.filters.algebra.linalg import Measurement, Rows, Vector
 from kfgen.filters.algebra.numbers import Number, is_constant, is_one, is_positive, is_zero, reciprocal, select, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.base import Block
-from kfgen.filters.covariance.full.straight import Full, packed
+from kfgen.filters.covariance.full.straight import Full
 from kfgen.filters.covariance.full.terms import Entries, Term
 from kfgen.filters.covariance.kernels.updates import add_terms, put_row, take_row
 from kfgen.filters.covariance.looped import (
@@ -25,8 +25,8 @@ from kfgen.filters.covariance.looped import (
     next_gain,
 )
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.ud.straight import column
 from kfgen.filters.frame.runs import Put, put
+from kfgen.filters.frame.triangles import upper, upper_start
 from kfgen.ir.trace import Array, Trace, Value
 
 PENDING = 4  # measurements that are taken together, in one pass over P
@@ -92,17 +92,17 @@ class RolledFull(Full):
                     sparse[row, col] = t.value(total)
         if kept:
             with t.loop("j", 0, n) as j, t.loop("i", 0, j + 1) as i:
-                spot = j * n + i if square else column(j) + i
-                a[spot] = a[spot] + t.element(kept, column(j) + i)
+                spot = j * n + i if square else upper_start(j) + i
+                a[spot] = a[spot] + t.element(kept, upper_start(j) + i)
 
         def add(i: int | Value, value: Value) -> None:
-            at = i * (n + 1) if square else packed(0, i) + i if isinstance(i, int) else column(i) + i
+            at = i * (n + 1) if square else upper(0, i) + i if isinstance(i, int) else upper_start(i) + i
             a[at] = a[at] + value
 
         put(t, add, {row: v for (row, col), v in sparse.items() if row == col})
         for (row, col), value in sparse.items():
             if row != col:
-                at = col * n + row if square else packed(row, col)
+                at = col * n + row if square else upper(row, col)
                 a[at] = a[at] + value
 
     def _kept(self, Q: Rows) -> str:
@@ -115,7 +115,7 @@ class RolledFull(Full):
                 other = Q[i][j].node if isinstance(Q[i][j], Value) else None
                 if other is None or other.op != "element" or other.data != node.data:
                     return ""
-                if other.args[0].constant != packed(i, j):
+                if other.args[0].constant != upper(i, j):
                     return ""
         return str(node.data)
 
@@ -239,7 +239,7 @@ class RolledFull(Full):
         t, array = P.space.t, Array(P.space.t, P.array)
         g = t.value(measurement.g)
         with t.loop("i", 0, self.n) as i:
-            place = column(i) + i
+            place = upper_start(i) + i
             variance = t.name(array[place], "variance")
             k = gain.array[i] if gain.factor is None else gain.array[i] * gain.factor
             old = variance + linalg.times(g, k) * c[i]
@@ -253,10 +253,10 @@ class RolledFull(Full):
         with t.loop("j", 0, n) as j:
             parts = [t.name(gain[j] * step * step * rate, "part") for gain, step in moved.terms]
             with t.loop("i", 0, j + 1) as i:
-                total = t.element(field, column(j) + i) * (1 - rate)
+                total = t.element(field, upper_start(j) + i) * (1 - rate)
                 for (gain, _), part in zip(moved.terms, parts, strict=True):
                     total = total + gain[i] * part
-                t.store(field, column(j) + i, total)
+                t.store(field, upper_start(j) + i, total)
 
     # sigma points -----------------------------------------------------------------------------------
 
@@ -276,7 +276,7 @@ class RolledFull(Full):
         P = self.written(P)
         own, worst = Array(t, P.array), t.variable(t.unique("worst"), 0)
         with t.loop("i", 0, n) as i:
-            place = column(i) + i
+            place = upper_start(i) + i
             variance = t.name(own[place], "variance")
             before = variance + array[i] * array[i] * weight
             # the points' rounding is in c
@@ -322,7 +322,7 @@ class RolledFull(Full):
             self._less_terms(P, target, put_at)
         elif P.square:
             with t.loop("j", 0, n) as j, t.loop("i", 0, j + 1) as i:
-                put_at(column(j) + i, P.at(n, i, j))
+                put_at(upper_start(j) + i, P.at(n, i, j))
         else:
             with t.loop("k", 0, n * (n + 1) // 2) as k:
                 put_at(k, P.at_place(k))
@@ -352,7 +352,7 @@ class RolledFull(Full):
                 total = P.at(n, i, j)
                 for term, part in zip(P.terms, parts, strict=True):
                     total = total - term.c[i] * part
-                put_at(column(j) + i, total)
+                put_at(upper_start(j) + i, total)
         for c, state, value in reversed(hidden):  # the gains are still asked for
             c[state] = value
 
@@ -379,7 +379,7 @@ class RolledFull(Full):
         def place(i: int | Value, j: int | Value) -> int | Value:
             if P.square:
                 return j * n + i
-            return (column(j) if isinstance(j, Value) else packed(0, j)) + i
+            return (upper_start(j) if isinstance(j, Value) else upper(0, j)) + i
 
         def limited(i: int, limit: Fraction, below: bool) -> Value:
             variance = t.name(array[place(i, i)], f"p_{self.names[i]}")

@@ -13,14 +13,9 @@ from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Covariance, GainChange
 from kfgen.filters.covariance.gather import cholesky, factor_columns
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.ud.straight import column
+from kfgen.filters.frame.triangles import upper, upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
-
-
-def packed(i: int, j: int) -> int:
-    """Position of P_ij, i <= j."""
-    return j * (j + 1) // 2 + i
 
 
 class Full:
@@ -50,7 +45,7 @@ class Full:
         return [Block("P", len(flat), "covariance, upper triangle column by column", initial=flat)]
 
     def load(self, t: Trace) -> Symmetric:
-        return Symmetric(self.n, lambda i, j: t.element("kf.P", packed(i, j)))
+        return Symmetric(self.n, lambda i, j: t.element("kf.P", upper(i, j)))
 
     def predict(self, t: Trace, P: Symmetric, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Symmetric:
         """F P F^T + Q + sum of d w w^T over the noise columns (w, d)."""
@@ -146,7 +141,7 @@ class Full:
         for last, j in enumerate(self.sequence if after_predict else range(self.n)):
             for i in self.sequence[: last + 1] if after_predict else range(j + 1):
                 low, high = min(i, j), max(i, j)
-                t.store("kf.P", packed(low, high), t.name(t.value(P[low, high]), f"p_{names[low]}_{names[high]}"))
+                t.store("kf.P", upper(low, high), t.name(t.value(P[low, high]), f"p_{names[low]}_{names[high]}"))
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
         return assembled(U, D)
@@ -184,7 +179,7 @@ class Full:
 
     def get(self, t: Trace, i: Value, j: Value) -> Value:
         """P_ij for counters i <= j."""
-        return t.element("kf.P", column(j) + i)
+        return t.element("kf.P", upper_start(j) + i)
 
     def put(self, t: Trace, P: Array, factors: Array) -> None:
         """Store a covariance (upper triangle column by column) whose factors are known to be positive."""

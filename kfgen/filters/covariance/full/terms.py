@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kfgen.filters.covariance.full.straight import packed
 from kfgen.filters.covariance.looped import Space
-from kfgen.filters.covariance.ud.straight import column
+from kfgen.filters.frame.triangles import upper, upper_start
 from kfgen.ir.trace import Array, Value
 
 
@@ -38,7 +37,7 @@ class Entries:
         t = self.space.t
         if self.square:
             return Array(t, self.array)[j * n + i]
-        return self.at_place(column(j) + i if isinstance(j, Value) else packed(0, j) + i)
+        return self.at_place(upper_start(j) + i if isinstance(j, Value) else upper(0, j) + i)
 
     def at_place(self, place: int | Value) -> Value:
         """An entry of a packed P0."""

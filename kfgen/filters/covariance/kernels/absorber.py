@@ -12,8 +12,8 @@ from kfgen.filters.covariance.kernels.points import remove
 from kfgen.filters.covariance.kernels.updates import absorb
 from kfgen.filters.covariance.looped import Given, Kernels, Space, fill, integer
 from kfgen.filters.covariance.noise import NEGATIVE, Additive, Factored
-from kfgen.filters.covariance.ud.straight import column, packed, triangle
 from kfgen.filters.frame.runs import Put, put
+from kfgen.filters.frame.triangles import strict, strict_start, upper_start
 from kfgen.ir.trace import Array, Trace, Value
 
 
@@ -118,8 +118,8 @@ class Absorber:
         w = self.columns(space)
         with t.loop("j", 0, n) as j:
             with t.loop("i", 0, j) as i:
-                U[triangle(j) + i] = t.element(field, column(j) + i)
-            D[j] = t.element(field, column(j) + j) * (1 - rate)
+                U[strict_start(j) + i] = t.element(field, upper_start(j) + i)
+            D[j] = t.element(field, upper_start(j) + j) * (1 - rate)
         for c in range(0, len(steps), 2):
             pair = steps[c : c + 2]
             with t.loop("i", 0, n) as i:
@@ -128,8 +128,8 @@ class Absorber:
             self.absorb(space, sure, [t.value(rate), t.value(rate if len(pair) > 1 else 0)], integer(t, n))
         with t.loop("j", 0, n) as j:
             with t.loop("i", 0, j) as i:
-                t.store(field, column(j) + i, U[triangle(j) + i])
-            t.store(field, column(j) + j, D[j])
+                t.store(field, upper_start(j) + i, U[strict_start(j) + i])
+            t.store(field, upper_start(j) + j, D[j])
 
     def absorb_columns(self, space: Space, sure: bool, columns: list[tuple[Vector, Value]]) -> None:
         """One or two columns (vector, weight), of which the entries are known one by one."""
@@ -148,10 +148,10 @@ class Absorber:
         if isinstance(Q, Factored) and Q.field:
             with t.loop("j", 0, n) as at:
                 with t.loop("i", 0, at) as above:
-                    U[triangle(at) + above] = t.element(Q.field, column(at) + above)
-                D[at] = t.element(Q.field, column(at) + at)
+                    U[strict_start(at) + above] = t.element(Q.field, upper_start(at) + above)
+                D[at] = t.element(Q.field, upper_start(at) + at)
         else:
-            flat = {packed(row, col): t.value(UQ[row][col]) for col in range(n) for row in range(col)}
+            flat = {strict(row, col): t.value(UQ[row][col]) for col in range(n) for row in range(col)}
             if any(is_zero(u) for u in flat.values()):
                 with t.loop("i", 0, len(flat)) as i:
                     U[i] = 0

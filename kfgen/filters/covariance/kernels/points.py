@@ -5,7 +5,7 @@ from __future__ import annotations
 from kfgen.filters.algebra.numbers import select, sqrt
 from kfgen.filters.covariance.kernels.updates import Given
 from kfgen.filters.covariance.looped import Kernels, array_argument, number_argument
-from kfgen.filters.covariance.ud.straight import column, triangle
+from kfgen.filters.frame.triangles import strict_start, upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Trace, Value
 
@@ -15,7 +15,7 @@ def _known(t: Trace, U: Given, D: Given, n: int, j: Value) -> Value:
     d = t.name(D[j], "d")
     variance = t.variable("variance", d)
     with t.loop("k", j + 1, n) as k:
-        u = t.name(U[triangle(k) + j], "u")
+        u = t.name(U[strict_start(k) + j], "u")
         variance.set(variance.get() + u * u * D[k])
     return t.name(~(d > variance.get() * t.field("tolerance")), "known")
 
@@ -25,7 +25,7 @@ def _backwards(t: Trace, U: Given, c: Given, n: int) -> None:
     with t.loop("j", 0, n, down=True) as j:
         v = t.name(c[j], "v")
         with t.loop("i", 0, j) as i:
-            c[i] = c[i] - U[triangle(j) + i] * v
+            c[i] = c[i] - U[strict_start(j) + i] * v
 
 
 def _factors(n: int, constant: bool) -> list[tuple[str, int, bool]]:
@@ -57,7 +57,7 @@ def remove(kernels: Kernels, n: int, sure: bool) -> Function:
             b = t.name(v * inverse, "b")
             D[j] = D[j] * select(some, before.get() * inverse, 1)
             with t.loop("i", 0, j) as i:
-                place = triangle(j) + i
+                place = strict_start(j) + i
                 k = t.name(gain[i], "k_i")
                 u = t.name(U[place] - f * k, "u")
                 U[place] = u
@@ -97,7 +97,7 @@ def remove_root(kernels: Kernels, n: int) -> Function:
             quotient = t.name(select(acts, s * (1 / r), 1), "quotient")
             D[j] = select(ends, 0, select(acts, r, s))
             with t.loop("i", 0, j) as i:
-                place = triangle(j) + i
+                place = strict_start(j) + i
                 w_i = t.name(w[i], "w_i")
                 new = t.name((S[place] - sine * w_i) * quotient, "changed")
                 w[i] = cosine * w_i - sine * new
@@ -123,7 +123,7 @@ def solve(kernels: Kernels, n: int) -> Function:
             d = t.name(D[j], "d_j")
             total = t.variable("total", c[j] * select((d > t.smallest) & ~known, 1 / d, 0))
             with t.loop("i", 0, j) as i:
-                total.set(total.get() - U[triangle(j) + i] * c[i])
+                total.set(total.get() - U[strict_start(j) + i] * c[i])
             c[j] = total.get()
 
     arguments = [array_argument(name, size, constant) for name, size, constant in _factors(n, True)]
@@ -142,15 +142,15 @@ def pivots(kernels: Kernels, n: int) -> Function:
             rest[k] = P[k]
         failed = t.variable("failed", 0)
         with t.loop("j", 0, n) as j:
-            pivot = t.name(rest[column(j) + j], "pivot")
-            limit = t.name(P[column(j) + j] * t.field("tolerance"), "limit")
+            pivot = t.name(rest[upper_start(j) + j], "pivot")
+            limit = t.name(P[upper_start(j) + j] * t.field("tolerance"), "limit")
             failed.set(select(~(pivot >= -limit), 1, failed.get()))
             inverse = t.name(select(pivot > limit, 1 / pivot, 0), "inverse")
             with t.loop("k", j + 1, n) as k:
-                u = t.name(rest[column(k) + j] * inverse, "u")
+                u = t.name(rest[upper_start(k) + j] * inverse, "u")
                 with t.loop("i", j + 1, k + 1) as i:
-                    place = column(k) + i
-                    rest[place] = rest[place] - u * rest[column(i) + j]
+                    place = upper_start(k) + i
+                    rest[place] = rest[place] - u * rest[upper_start(i) + j]
         Given(t, "told")[0] = failed.get()
 
     arguments = [array_argument("P", n * (n + 1) // 2, constant=True), number_argument("tolerance"),

@@ -11,7 +11,7 @@ from kfgen.filters.covariance.looped import (
     number_argument,
     select_counter,
 )
-from kfgen.filters.covariance.ud.straight import column, triangle
+from kfgen.filters.frame.triangles import strict_start, upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value, Variable
 
@@ -62,7 +62,7 @@ def absorb(kernels: Kernels, n: int, sure: bool) -> Function:
             w[j] = t.zero
             w[j + n] = t.zero
             with t.loop("i", 0, j) as i:
-                place = triangle(j) + i
+                place = strict_start(j) + i
                 u, a, b = t.name(U[place], "u"), t.name(w[i], "a"), t.name(w[i + n], "b")
                 between = t.name(ratio_a * u + gain_a * a, "u_a")
                 w[i] = a - s[0] * u
@@ -86,12 +86,12 @@ def bierman(kernels: Kernels, n: int, single: bool, sure: bool, weighted: bool, 
         """f_j, entry j of U^T h^T."""
         if single:
             state, h = counter(t, "state"), t.field("h")
-            seen: Value = select(state < j, h * U[triangle(j) + state], h)
+            seen: Value = select(state < j, h * U[strict_start(j) + state], h)
             return seen
         row, first, last = Given(t, "h"), counter(t, "first"), counter(t, "last")
         product = t.variable("product", row[j])
         with t.loop("i", first, select_counter(j <= last, j, last + 1)) as i:
-            product.set(product.get() + U[triangle(j) + i] * row[i])
+            product.set(product.get() + U[strict_start(j) + i] * row[i])
         return product.get()
 
     def body(t: Trace) -> None:
@@ -121,7 +121,7 @@ def bierman(kernels: Kernels, n: int, single: bool, sure: bool, weighted: bool, 
                 latest.set(inverse)
             b = t.name(v * inverse, "b")
             with t.loop("i", 0, j) as i:
-                place = triangle(j) + i
+                place = strict_start(j) + i
                 k = t.name(gain[i], "k_i")
                 u = t.name(U[place] - weighed * k, "u")
                 U[place] = u
@@ -171,7 +171,7 @@ def carlson(kernels: Kernels, n: int, sure: bool, weighted: bool, moves: bool) -
             d = t.name(D[j], "d")
             product = t.variable("product", h[j] * d)
             with t.loop("i", first, select_counter(j <= last, j, last + 1)) as i:
-                product.set(product.get() + S[triangle(j) + i] * h[i])
+                product.set(product.get() + S[strict_start(j) + i] * h[i])
             f = t.name(product.get(), "f")
             weighed = t.name(t.field("weight") * f, "f_weighed") if weighted else f
             after = t.name(s.get() + weighed * f, "after")
@@ -181,7 +181,7 @@ def carlson(kernels: Kernels, n: int, sure: bool, weighted: bool, moves: bool) -
             beta = t.name(beta if sure else select(after > 0, beta, 1), "beta")
             gamma = t.name(weighed * inverse * per_before.get(), "gamma")
             with t.loop("i", 0, j) as i:
-                place = triangle(j) + i
+                place = strict_start(j) + i
                 old, b_i = t.name(S[place], "old"), t.name(b[i], "b_i")
                 S[place] = beta * old - gamma * b_i
                 b[i] = b_i + f * old
@@ -220,9 +220,9 @@ def take_row(kernels: Kernels, n: int) -> Function:
         P, row = Given(t, "P"), Given(t, "row")
         i = counter(t, "i")
         with t.loop("j", 0, i + 1) as j:
-            row[j] = P[column(i) + j]
+            row[j] = P[upper_start(i) + j]
         with t.loop("j", i + 1, n) as j:
-            row[j] = P[column(j) + i]
+            row[j] = P[upper_start(j) + i]
 
     arguments = [array_argument("P", n * (n + 1) // 2, constant=True), counter_argument("i"), array_argument("row", n)]
     return kernels.function("take_row", arguments, "Row i of a symmetric matrix", body)
@@ -235,9 +235,9 @@ def put_row(kernels: Kernels, n: int) -> Function:
         P, row, factor = Given(t, "P"), Given(t, "row"), t.field("factor")
         i = counter(t, "i")
         with t.loop("j", 0, i + 1) as j:
-            P[column(i) + j] = row[j] * factor
+            P[upper_start(i) + j] = row[j] * factor
         with t.loop("j", i + 1, n) as j:
-            P[column(j) + i] = row[j] * factor
+            P[upper_start(j) + i] = row[j] * factor
 
     arguments = [array_argument("P", n * (n + 1) // 2), counter_argument("i")]
     arguments += [array_argument("row", n, constant=True), number_argument("factor")]
@@ -252,7 +252,7 @@ def add_terms(kernels: Kernels, n: int) -> Function:
         with t.loop("j", 0, n) as j:
             c_j, gain_j = t.name(c[j], "c_j"), t.name(gain[j], "gain_j")
             with t.loop("i", 0, j + 1) as i:
-                P[column(j) + i] = P[column(j) + i] - gain[i] * c_j + rest[i] * gain_j
+                P[upper_start(j) + i] = P[upper_start(j) + i] - gain[i] * c_j + rest[i] * gain_j
 
     arguments = [array_argument("P", n * (n + 1) // 2)]
     arguments += [array_argument(name, n, constant=True) for name in ("c", "gain", "rest")]

@@ -25,8 +25,8 @@ from kfgen.filters.covariance.looped import (
 )
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.sqrt.straight import Sqrt
-from kfgen.filters.covariance.ud.straight import packed, triangle
 from kfgen.filters.frame.runs import Put
+from kfgen.filters.frame.triangles import strict, strict_start
 from kfgen.ir.trace import Array, Trace, Value
 
 
@@ -66,7 +66,7 @@ class RolledSqrt(Sqrt):
         """S_ij, i < j."""
         t = P.space.t
         if P.own:
-            return P.space.arrays["factor"][(triangle(j) if isinstance(j, Value) else packed(0, j)) + i]
+            return P.space.arrays["factor"][(strict_start(j) if isinstance(j, Value) else strict(0, j)) + i]
         return t.element("kf.S", self.spot(t, i, j))
 
     def _diagonal(self, P: Root, j: int | Value) -> Value:
@@ -88,7 +88,7 @@ class RolledSqrt(Sqrt):
         U, D = self.absorber.arrays(P.space)
         with t.loop("j", 0, self.n) as j:
             with t.loop("i", 0, j) as i:
-                U[triangle(j) + i] = self._at(P, i, j)
+                U[strict_start(j) + i] = self._at(P, i, j)
             D[j] = self._diagonal(P, j)
         return Root(P.space, own=True)
 
@@ -119,7 +119,7 @@ class RolledSqrt(Sqrt):
             root = t.name(sqrt(assume_nonnegative(D[j])), "root")
             D[j] = root
             with t.loop("i", 0, j) as i:
-                U[triangle(j) + i] = U[triangle(j) + i] * root
+                U[strict_start(j) + i] = U[strict_start(j) + i] * root
 
     def update(self, t: Trace, P: Root, measurements: list[Measurement]  # type: ignore[override]
                ) -> tuple[Root, Rows, Vector]:  # fmt: skip
@@ -239,7 +239,7 @@ class RolledSqrt(Sqrt):
                 scale = t.name(select(own > edge, edge / own, 1), "scale")
                 D[i] = own * scale
                 with t.loop("j", i + 1, self.n) as j:
-                    U[triangle(j) + i] = U[triangle(j) + i] * scale
+                    U[strict_start(j) + i] = U[strict_start(j) + i] * scale
         return P
 
     def evidence(self, P: Root, after_predict: bool) -> list[Value]:  # type: ignore[override]

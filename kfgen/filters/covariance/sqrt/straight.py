@@ -27,7 +27,7 @@ from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.base import Covariance, GainChange
 from kfgen.filters.covariance.gather import columns_of, root_of_factors
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
-from kfgen.filters.covariance.ud.straight import column
+from kfgen.filters.frame.triangles import upper_start
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
@@ -238,7 +238,7 @@ class Sqrt:
         t.section("columns may change their sign: the diagonal is kept positive")
         with t.loop("i", 0, n) as i, t.loop("j", 0, i + 1) as j:
             value = t.name(t.element("S", i * n + j), "value")
-            t.store("kf.S", column(i) + j, select(t.element("S", j * n + j) < 0, -value, value))
+            t.store("kf.S", upper_start(i) + j, select(t.element("S", j * n + j) < 0, -value, value))
         if outdated:
             t.store(outdated, None, t.wrapped(t.pool.boolean(False)))
         doc = "lower triangular root, row-major; the lower triangle is read"
@@ -252,7 +252,7 @@ class Sqrt:
         t, n = Trace(), self.n
         with t.loop("i", 0, n) as i:
             with t.loop("j", 0, i + 1) as j:
-                t.store("S", i * n + j, t.element("kf.S", column(i) + j))
+                t.store("S", i * n + j, t.element("kf.S", upper_start(i) + j))
             with t.loop("j", i + 1, n) as j:
                 t.store("S", i * n + j, t.zero)
         doc = "lower triangular root, row-major"
@@ -266,7 +266,7 @@ class Sqrt:
 
     def _place(self, i: Value, j: Value) -> Value:
         """Position of S_ij for counters i <= j."""
-        return column((self.n - 1) - i) + ((self.n - 1) - j)
+        return upper_start((self.n - 1) - i) + ((self.n - 1) - j)
 
     def get(self, t: Trace, i: Value, j: Value) -> Value:
         """P_ij for counters i <= j, summed in a loop."""
@@ -278,11 +278,11 @@ class Sqrt:
     def put(self, t: Trace, P: Array, factors: Array) -> None:
         """Store the root of a covariance given by its factors (D on the diagonal, U above)."""
         with t.loop("j", 0, self.n) as j:
-            root = t.name(sqrt(factors[column(j) + j]), "root")
+            root = t.name(sqrt(factors[upper_start(j) + j]), "root")
             t.store("kf.S", self._place(j, j), root)
             if self.n > 1:
                 with t.loop("i", 0, j) as i:
-                    t.store("kf.S", self._place(i, j), factors[column(j) + i] * root)
+                    t.store("kf.S", self._place(i, j), factors[upper_start(j) + i] * root)
 
 
 def _root(a: Number) -> tuple[Number, Number]:

@@ -27,8 +27,9 @@ from kfgen.filters.covariance.looped import (
     next_gain,
 )
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.ud.straight import UD, packed, triangle
+from kfgen.filters.covariance.ud.straight import UD
 from kfgen.filters.frame.runs import Put
+from kfgen.filters.frame.triangles import strict, strict_start
 from kfgen.ir.trace import Array, Trace, Value
 
 
@@ -98,7 +99,7 @@ class RolledUD(UD):
 
         def column_of(k: Value, entry: Put) -> None:
             with t.loop("i", 0, k) as i:
-                entry(i, t.element("kf.U", triangle(k) + i))
+                entry(i, t.element("kf.U", strict_start(k) + i))
             entry(k, t.one)
 
         title = "F U D U^T F^T + Q, two columns of F U after another"
@@ -175,13 +176,13 @@ class RolledUD(UD):
     def _entry(self, P: Factors, i: int, j: int) -> Value:
         """P_ij, i <= j, summed in a loop."""
         t, n = P.space.t, self.n
-        start = P.d(j) if i == j else P.d(j) * P.u(packed(i, j))
+        start = P.d(j) if i == j else P.d(j) * P.u(strict(i, j))
         if j == n - 1:
             return start
         total = t.variable(t.unique("total"), start)
         with t.loop("k", j + 1, n) as k:
-            u = P.u(triangle(k) + i) * P.d(k)
-            total.set(total.get() + u * P.u(triangle(k) + j))
+            u = P.u(strict_start(k) + i) * P.d(k)
+            total.set(total.get() + u * P.u(strict_start(k) + j))
         value = t.name(total.get(), f"p_{self.names[i]}_{self.names[j]}")
         return assume_nonnegative(value) if i == j else value
 
@@ -195,7 +196,7 @@ class RolledUD(UD):
         with t.loop("j", first, n) as j:
             f = t.variable("f", array[j])
             with t.loop("i", first, j) as i:
-                f.set(f.get() + P.u(triangle(j) + i) * array[i])
+                f.set(f.get() + P.u(strict_start(j) + i) * array[i])
             v = t.name(f.get(), "f_j")
             total.set(total.get() + v * v * P.d(j))
         return assume_nonnegative(t.name(total.get(), "spread"))

@@ -13,13 +13,9 @@ from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Covariance, GainChange
 from kfgen.filters.covariance.gather import columns_of, factor_columns, root_of_factors
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
+from kfgen.filters.frame.triangles import strict, strict_start, upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
-
-
-def packed(i: int, j: int) -> int:
-    """Position of U_ij, i < j, in the packed array: strictly upper, column by column."""
-    return j * (j - 1) // 2 + i
 
 
 class UD:
@@ -52,7 +48,7 @@ class UD:
 
     def load(self, t: Trace) -> tuple[Rows, Vector]:
         n = self.n
-        U: Rows = [[t.element("kf.U", packed(i, j)) if i < j else t.zero for j in range(n)] for i in range(n)]
+        U: Rows = [[t.element("kf.U", strict(i, j)) if i < j else t.zero for j in range(n)] for i in range(n)]
         D = [assume_nonnegative(t.element("kf.D", j)) for j in range(n)]
         return U, D
 
@@ -169,7 +165,7 @@ class UD:
         U, D = P
         for j in range(self.n):
             for i in range(j):
-                t.store("kf.U", packed(i, j), t.name(t.value(U[i][j]), f"u_{names[i]}_{names[j]}"))
+                t.store("kf.U", strict(i, j), t.name(t.value(U[i][j]), f"u_{names[i]}_{names[j]}"))
         for j in range(self.n):
             t.store("kf.D", j, t.name(t.value(D[j]), f"d_{names[j]}"))
 
@@ -208,10 +204,10 @@ class UD:
             return t.element("kf.D", j)
         total = t.variable("sum", t.element("kf.D", j))
         with t.when(i < j):
-            total.set(total.get() * t.element("kf.U", triangle(j) + i))
+            total.set(total.get() * t.element("kf.U", strict_start(j) + i))
         with t.loop("k", j + 1, n) as k:
-            u = t.element("kf.U", triangle(k) + i) * t.element("kf.D", k)
-            total.set(total.get() + u * t.element("kf.U", triangle(k) + j))
+            u = t.element("kf.U", strict_start(k) + i) * t.element("kf.D", k)
+            total.set(total.get() + u * t.element("kf.U", strict_start(k) + j))
         return total.get()
 
     def put(self, t: Trace, P: Array, factors: Array) -> None:
@@ -219,17 +215,6 @@ class UD:
         with t.loop("j", 0, self.n) as j:
             if self.n > 1:
                 with t.loop("i", 0, j) as i:
-                    t.store("kf.U", triangle(j) + i, factors[column(j) + i])
-            t.store("kf.D", j, factors[column(j) + j])
+                    t.store("kf.U", strict_start(j) + i, factors[upper_start(j) + i])
+            t.store("kf.D", j, factors[upper_start(j) + j])
 
-
-def triangle(j: Value) -> Value:
-    """j (j - 1) / 2: where column j of a strictly upper triangle starts."""
-    t = j.trace
-    return t.wrapped(t.pool.make("half", ((j * (j - 1)).node,), kind="int"))
-
-
-def column(j: Value) -> Value:
-    """j (j + 1) / 2: where column j of an upper triangle starts."""
-    t = j.trace
-    return t.wrapped(t.pool.make("half", ((j * (j + 1)).node,), kind="int"))
