@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Measurement
+from kfgen.filters.algebra.factors import gram_schmidt, udu
+from kfgen.filters.algebra.measurement import Measurement, bierman
+from kfgen.filters.algebra.rank_one import rank_one, unit_columns
 from kfgen.filters.algebra.symmetric import Symmetric
 
 TYPES = [float, np.float64]
@@ -39,7 +41,7 @@ def test_bierman_is_the_dense_update(seed):
     H = random.normal(size=(m, n)) * (random.random((m, n)) < 0.7)
     R = random.uniform(0.1, 1, m)
     P = dense(U, D)
-    gains, s = linalg.bierman(U, D, [Measurement(h.tolist(), r) for h, r in zip(H, R, strict=True)])
+    gains, s = bierman(U, D, [Measurement(h.tolist(), r) for h, r in zip(H, R, strict=True)])
     for h, r, K, variance in zip(H, R, gains, s, strict=True):
         expected = h @ P @ h + r
         assert variance == pytest.approx(expected, rel=1e-12)
@@ -53,12 +55,12 @@ def test_bierman_with_an_exact_measurement():
     """r = 0: the measured direction is known afterwards; measured again it is skipped."""
     U, D = [[1, 0.5], [0, 1]], [1.0, 2.0]
     P = dense(U, D)
-    gains, s = linalg.bierman(U, D, [Measurement([1.0, 0.0], 0.0)])
+    gains, s = bierman(U, D, [Measurement([1.0, 0.0], 0.0)])
     np.testing.assert_allclose(gains[0], P[:, 0] / P[0, 0], rtol=1e-15)
     assert s[0] == pytest.approx(P[0, 0])
     np.testing.assert_allclose(dense(U, D), joseph(P, np.array([1.0, 0]), 0, P[:, 0] / P[0, 0]), atol=1e-15)
     U, D = [[1, 0.0], [0, 1]], [0.0, 2.0]
-    gains, s = linalg.bierman(U, D, [Measurement([1.0, 0.0], 0.0)])
+    gains, s = bierman(U, D, [Measurement([1.0, 0.0], 0.0)])
     assert np.all(np.array(gains, dtype=float) == 0)
     assert s == [0.0]
     np.testing.assert_array_equal(dense(U, D), np.diag([0.0, 2.0]))
@@ -67,7 +69,7 @@ def test_bierman_with_an_exact_measurement():
 def test_six_equal_sensors():
     U, D = [[1]], [1e6]
     x = 0.0
-    gains, _ = linalg.bierman(U, D, [Measurement([1.0], 1.0)] * 6)
+    gains, _ = bierman(U, D, [Measurement([1.0], 1.0)] * 6)
     for (k,) in gains:
         x += k * (10 - x)
     assert x == pytest.approx(10, abs=1e-4)
@@ -83,7 +85,7 @@ def test_rank_one_is_the_dense_sum(seed):
     d = random.uniform(0, 2, k) * (random.random(k) < 0.8)
     own = [int(random.integers(-1, n)) for _ in range(k)]
     expected = dense(U, D) + (W.T * d) @ W
-    linalg.rank_one(U, D, [(w.tolist(), float(v), o) for w, v, o in zip(W, d, own, strict=True)])
+    rank_one(U, D, [(w.tolist(), float(v), o) for w, v, o in zip(W, d, own, strict=True)])
     np.testing.assert_allclose(dense(U, D), expected, atol=1e-12)
     assert min(D) >= 0
 
@@ -95,10 +97,10 @@ def test_rank_one_on_a_zero_matrix(scalar):
         n = len(w)
         U = [[scalar(i == j) for j in range(n)] for i in range(n)]
         D = [scalar(0)] * n
-        linalg.rank_one(U, D, [([scalar(v) for v in w], scalar(1), -1)])
+        rank_one(U, D, [([scalar(v) for v in w], scalar(1), -1)])
         np.testing.assert_allclose(dense(U, D), np.outer(w, w), atol=1e-14)
     U, D = [[1.0, 0.0], [0.0, 1.0]], [0.0, 0.0]
-    linalg.rank_one(U, D, [([3.0, 0.0], 1.0, -1), ([1.0, 1.0], 0.0, -1)])
+    rank_one(U, D, [([3.0, 0.0], 1.0, -1), ([1.0, 1.0], 0.0, -1)])
     assert dense(U, D)[0, 0] == 9
 
 
@@ -107,7 +109,7 @@ def test_rank_one_keeps_small_numbers():
     U = [[np.float32(1), np.float32(0.5)], [np.float32(0), np.float32(1)]]
     D = [np.float32(1e-6), np.float32(1e-12)]
     expected = dense(U, D) + np.outer([0.25, 1], [0.25, 1]) * 1e-3
-    linalg.rank_one(U, D, [([np.float32(0.25), np.float32(1)], np.float32(1e-3), 1)])
+    rank_one(U, D, [([np.float32(0.25), np.float32(1)], np.float32(1e-3), 1)])
     np.testing.assert_allclose(dense(U, D), expected, rtol=1e-6)
     assert np.linalg.det(dense(U, D)) == pytest.approx(np.linalg.det(expected), rel=1e-3)
 
@@ -121,7 +123,7 @@ def test_gram_schmidt(seed):
     if seed % 3 == 0 and n > 1:
         W[0] = 2 * W[1]  # semidefinite
     d = random.uniform(0.1, 2, m) * (random.random(m) < 0.9)
-    U, D = linalg.gram_schmidt(W.tolist(), d.tolist())
+    U, D = gram_schmidt(W.tolist(), d.tolist())
     np.testing.assert_allclose(dense(U, D), (W * d) @ W.T, atol=1e-10)
     assert min(D) >= 0
 
@@ -132,7 +134,7 @@ def test_udu(seed):
     n = int(random.integers(1, 7))
     A = random.integers(-3, 4, (n, n if seed % 2 else max(1, n - 1))) / 2
     P = A @ A.T  # of small integers over 4: zero pivots come out exactly
-    U, D = linalg.udu(P.tolist())
+    U, D = udu(P.tolist())
     if seed % 2:
         np.testing.assert_allclose(dense(U, D), P, atol=1e-9)
     elif min(D) >= 0:
@@ -141,7 +143,7 @@ def test_udu(seed):
 
 def test_udu_of_semidefinite_matrices():
     for P in (np.zeros((3, 3)), np.ones((3, 3)), np.diag([0.0, 2, 0]), np.array([[4.0, 0, 2], [0, 0, 0], [2, 0, 1]])):
-        U, D = linalg.udu(P.tolist())
+        U, D = udu(P.tolist())
         np.testing.assert_array_equal(dense(U, D), P)
         assert min(D) >= 0
 
@@ -192,6 +194,6 @@ def test_unit_columns_and_dot():
     random = np.random.default_rng(1)
     F, U = random.normal(size=(4, 4)), np.triu(random.normal(size=(4, 4)), 1) + np.eye(4)
     for k in range(4):
-        np.testing.assert_allclose(linalg.unit_columns(F.tolist(), U.tolist(), k), (F @ U)[:, k], atol=1e-14)
+        np.testing.assert_allclose(unit_columns(F.tolist(), U.tolist(), k), (F @ U)[:, k], atol=1e-14)
     assert linalg.dot([], []) == 0
     assert linalg.dot([0, 2.0], [5.0, 3.0]) == 6

@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from kfgen.filters.algebra import linalg
-from kfgen.filters.covariance.gather import cholesky, columns_of, root_of_factors
+from kfgen.filters.algebra.factors import cholesky, columns_of, root_of_factors
+from kfgen.filters.algebra.measurement import downdate
 from kfgen.filters.covariance.sqrt.straight import Sqrt
 from kfgen.filters.sigma.points import PointSet, point_set
 from kfgen.ir.interpret import Memory, run
@@ -195,7 +195,7 @@ def test_downdate(seed):
     h = random.integers(-2, 3, n) + 0.5  # of few digits: what is left is then left by the downdate
     c, share = P @ h, (0.5, 0.99, 1.0)[seed % 3]
     s = np.float64(h @ c / share)
-    failed, gone = linalg.downdate(U, D, [np.float64(v) for v in c], s, 8 * n * EPS)
+    failed, gone = downdate(U, D, [np.float64(v) for v in c], s, 8 * n * EPS)
     assert not failed
     assert not gone  # the last digit is exact
     sigma = np.sqrt(P.diagonal())
@@ -203,7 +203,7 @@ def test_downdate(seed):
                                atol=1e-12)  # fmt: skip
     assert min(D) >= 0
     U, D = numbers(np.eye(n)), [np.float64(1)] * n
-    assert linalg.downdate(U, D, [np.float64(1.01)] + [np.float64(0)] * (n - 1), np.float64(1), 8 * n * EPS)[0]
+    assert downdate(U, D, [np.float64(1.01)] + [np.float64(0)] * (n - 1), np.float64(1), 8 * n * EPS)[0]
 
 
 def test_downdate_of_what_is_known():
@@ -211,7 +211,7 @@ def test_downdate_of_what_is_known():
     U, D = numbers(np.array([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]])), [np.float64(v) for v in (2, 0, 3)]
     P = dense(U, D)
     c = [np.float64(v) for v in (1, 0, 1.5)]
-    failed, gone = linalg.downdate(U, D, c, np.float64(4), 24 * EPS)
+    failed, gone = downdate(U, D, c, np.float64(4), 24 * EPS)
     assert not failed
     assert not gone
     np.testing.assert_allclose(dense(U, D), P - np.outer(c, c) / 4, atol=1e-15)

@@ -24,8 +24,8 @@ import sympy
 from sympy.integrals.quadrature import gauss_legendre
 
 from kfgen.errors import SpecError
-from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.dual import Dual, Evaluator
+from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import is_zero
 from kfgen.ir.constants import DIGITS, to_fraction, to_mpf
@@ -75,7 +75,7 @@ class Linear:
             inner = sympy.Matrix(q, q, [sympy.Rational(v.numerator, v.denominator) for v in constant if v is not None])
             exact = _van_loan(self.A, self.G * inner * self.G.T, dt.constant)
             return [[t.value(v) for v in row] for row in exact], []
-        U, D = linalg.udu(Qc)
+        U, D = udu(Qc)
         columns = []
         nodes, weights = gauss_legendre(self.points, DIGITS)
         for node, weight in zip(nodes, weights, strict=True):

@@ -9,7 +9,7 @@ from typing import Any
 
 import mpmath
 
-from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.factors import udu
 from kfgen.ir.constants import DIGITS, to_fraction, to_mpf
 
 Exact = list[list[Fraction]]
@@ -92,7 +92,7 @@ class _Sensor:
     """One sensor, decorrelated: R = U D U^T."""
 
     def __init__(self, H: Exact, R: Exact) -> None:
-        U, D = linalg.udu([list(row) for row in R])
+        U, D = udu([list(row) for row in R])
         m = len(R)
         self.H = _matrix(H)
         self.variances = [to_mpf(Fraction(d)) for d in D]

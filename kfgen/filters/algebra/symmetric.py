@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from kfgen.filters.algebra.linalg import Measurement, Rows, Vector, dot, minus, plus, times
+from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, plus, times
+from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, is_constant, is_one, is_zero
 
 

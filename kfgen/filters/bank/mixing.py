@@ -21,6 +21,7 @@ from kfgen.filters.algebra.numbers import (
     reciprocal,
     select,
 )  # fmt: skip
+from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Covariance, Layout
 from kfgen.ir.trace import Trace, Value
@@ -138,7 +139,7 @@ def mixed(t: Trace, parts: list[Estimate], weights: list[Number], spreads: Sprea
             added.append((_ordered(straight, layout), times(weight, weights[i]), k if same else -1))
     added += [(column, weight, -1) for column, weight in columns]
     for c in range(0, len(added), layout.group):
-        linalg.rank_one(U, D, added[c : c + layout.group], safe=not layout.reorders)
+        rank_one(U, D, added[c : c + layout.group], safe=not layout.reorders)
     return layout.from_factors(t, U, D)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from fractions import Fraction
 from typing import Protocol
 
 from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.factors import cholesky, indefinite, root_of_factors, udu
 from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.measurement import downdate
 from kfgen.filters.algebra.numbers import (
-    Number,
     assume_nonnegative,
     assume_positive,
     is_constant,
@@ -17,8 +17,8 @@ from kfgen.filters.algebra.numbers import (
     is_zero,
     require_nonnegative,
     select,
-    sqrt,
 )  # fmt: skip
+from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Covariance, Layout
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
@@ -102,25 +102,6 @@ class _Entries:
         return P, indefinite(P, self.n * self.epsilon) if self.checked else []
 
 
-def indefinite(P: Symmetric, tolerance: Fraction) -> list[Value]:
-    """Conditions under which a pivot of P is negative beyond rounding."""
-    n = P.n
-    failures: list[Value] = []
-    rest = [[P[i, j] for j in range(n)] for i in range(n)]
-    for j in range(n):
-        pivot = rest[j][j]
-        if is_zero(pivot):
-            continue
-        limit = P[j, j] * (8 * tolerance)
-        failures.append(~(pivot >= -limit))
-        inverse = select(pivot > limit, 1 / pivot, 0)
-        for i in range(j + 1, n):
-            u = rest[j][i] * inverse
-            for k in range(i, n):
-                rest[i][k] = rest[i][k] - u * rest[j][k]
-    return failures
-
-
 class _Factors:
     """For U D U^T and for a triangular root: rank-one updates of U and D, kept in variables."""
 
@@ -133,7 +114,7 @@ class _Factors:
         U, D = Q.factors()
         for column, d in columns:
             assume_nonnegative(d)
-            linalg.rank_one(U, D, [(column, d, -1)], safe=True)
+            rank_one(U, D, [(column, d, -1)], safe=True)
         self.sure = [is_positive(t.value(d)) for d in D]
         self.U: dict[tuple[int, int], Variable] = {
             (i, j): t.variable(f"u_{names[i]}_{names[j]}", t.value(U[i][j])) for j in range(n) for i in range(j)
@@ -158,12 +139,12 @@ class _Factors:
 
     def add(self, d: Vector, weight: Weight) -> None:
         U, D = self._read()
-        linalg.rank_one(U, D, [(d, self.t.value(weight), -1)], safe=True)
+        rank_one(U, D, [(d, self.t.value(weight), -1)], safe=True)
         self._write(U, D)
 
     def subtract(self, d: Vector, weight: Weight) -> None:
         U, D = self._read()
-        failed, gone = linalg.downdate(U, D, d, 1 / self.t.value(weight), 8 * self.n * self.epsilon)
+        failed, gone = downdate(U, D, d, 1 / self.t.value(weight), 8 * self.n * self.epsilon)
         self.t.flag(gone, "REGULARIZED")
         if self.t.depth == self.depth:
             self.failures.append(failed)
@@ -178,60 +159,13 @@ class _Factors:
         return self.layout.from_factors(self.t, U, D), self.failures
 
 
-def columns_of(rows: Rows) -> list[Vector]:
-    """The columns of an upper triangular matrix, as full vectors."""
-    n = len(rows)
-    return [[rows[i][j] if i <= j else 0 for i in range(n)] for j in range(n)]
-
-
-def factor_columns(U: Rows, D: Vector) -> list[tuple[Vector, Number]]:
-    """The columns of a unit upper triangular U with their weights."""
-    n = len(D)
-    return [([*(U[i][j] for i in range(j)), 1, *[0] * (n - j - 1)], D[j]) for j in range(n)]
-
-
-def root_of_factors(U: Rows, D: Vector) -> Rows:
-    """U sqrt(D)."""
-    n = len(D)
-    out: Rows = [[0] * n for _ in range(n)]
-    for j in range(n):
-        root = D[j] if is_zero(D[j]) else sqrt(D[j])
-        for i in range(j):
-            out[i][j] = linalg.times(U[i][j], root)
-        out[j][j] = root
-    return out
-
-
-def cholesky(P: Callable[[int, int], Value], n: int, tolerance: Fraction) -> tuple[Rows, list[Value]]:
-    """The lower root S of P (n, n) with S S^T = P, and conditions under which P is indefinite beyond rounding.
-
-    A pivot up to `tolerance` of its diagonal is a direction without spread: a zero column.
-    """
-    S: Rows = [[0] * n for _ in range(n)]
-    failures: list[Value] = []
-    for j in range(n):
-        diagonal = P(j, j)
-        pivot = diagonal - linalg.dot(S[j][:j], S[j][:j]) if j else diagonal
-        if is_zero(pivot):
-            continue
-        limit = diagonal * tolerance
-        failures.append(~(pivot >= -limit))
-        some = pivot > limit
-        root = sqrt(select(some, pivot, 0))
-        S[j][j] = assume_nonnegative(root)
-        inverse = select(some, 1 / root, 0)
-        for i in range(j + 1, n):
-            S[i][j] = linalg.times(linalg.minus(P(j, i), linalg.dot(S[i][:j], S[j][:j])), inverse)
-    return S, failures
-
-
 def noise_root(C: Rows, form: str, tolerance: Fraction) -> tuple[Rows, list[Value]]:
     """A root of the covariance of noise inputs (q, q), of the kind that the form of the covariance has; and what of C
     has to be tested to be finite. That C is a covariance is left to a guard."""
     values = [v for row in C for v in row if v.constant is None]
     if not C:
         return [], values
-    U, D = linalg.udu(C)
+    U, D = udu(C)
     for d in D:
         require_nonnegative(d, NEGATIVE)
     if form == "ud":

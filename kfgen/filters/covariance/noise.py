@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Protocol
 
 from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.factors import udu, udu_computed
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import is_zero, require_nonnegative
 from kfgen.filters.algebra.symmetric import assembled
@@ -34,12 +35,12 @@ class Given:
     def entries(self) -> Rows:
         if any(q.constant is None for row in self.Q for q in row):  # a constant Q was tested with the spec
             diagonal = [self.Q[i][i] for i in range(len(self.Q))]
-            for q in diagonal if _is_diagonal(self.Q) else linalg.udu(self.Q)[1]:
+            for q in diagonal if _is_diagonal(self.Q) else udu(self.Q)[1]:
                 require_nonnegative(q, NEGATIVE)
         return self.Q
 
     def factors(self) -> tuple[Rows, Vector]:
-        U, D = _trivial(self.Q) if _is_diagonal(self.Q) else linalg.udu(self.Q)
+        U, D = _trivial(self.Q) if _is_diagonal(self.Q) else udu(self.Q)
         for d in D:
             require_nonnegative(d, NEGATIVE)
         return U, D
@@ -56,7 +57,7 @@ class Computed:
         return self.Q
 
     def factors(self) -> tuple[Rows, Vector]:
-        return _trivial(self.Q) if _is_diagonal(self.Q) else linalg.udu_computed(self.Q, self.smallest)
+        return _trivial(self.Q) if _is_diagonal(self.Q) else udu_computed(self.Q, self.smallest)
 
 
 class Factored:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_nonnegative, is_zero, select, sqrt
+from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Covariance, Layout
 from kfgen.filters.covariance.noise import Additive
@@ -143,7 +144,7 @@ class Factors:
         self.absorb = absorb
         U, D = Q.factors()
         for w, d in columns:
-            linalg.rank_one(U, D, [(w, assume_nonnegative(d), -1)], safe=True)
+            rank_one(U, D, [(w, assume_nonnegative(d), -1)], safe=True)
         self.U, self.D = t.array("factor", n * (n - 1) // 2), t.array("diagonal", n)
         self.w = t.array("w", n)
         for j in range(n):
@@ -174,7 +175,7 @@ class Factors:
 
 
 def absorb(n: int, smallest: Fraction, taken: frozenset[str]) -> Function:
-    """U D U^T += weight w w^T (Agee & Turner 1972), as `linalg.rank_one`."""
+    """U D U^T += weight w w^T (Agee & Turner 1972), as `rank_one`."""
     t = Trace(smallest)
     weight = t.variable("left", t.field("weight"))
     with t.loop("j", 0, n, down=True) as j:

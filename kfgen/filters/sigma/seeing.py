@@ -7,13 +7,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Rows, Vector, times
-from kfgen.filters.algebra.numbers import (
-    assume_nonnegative,
-    is_zero,
-    reciprocal,
-    select,
-)  # fmt: skip
+from kfgen.filters.algebra.factors import solved, udu
+from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Covariance
 from kfgen.filters.covariance.gather import noise_root
@@ -276,7 +271,7 @@ class Seeing:
         dense = u.layout.entries(u.P)
         known = [dense[j, j] * self.tolerance for j in range(self.n)]  # a pivot up to it is a direction without spread
         for a in range(self.m):
-            H.append(_solved(U, D, [seen.cross[i][a] for i in range(self.n)], known))
+            H.append(solved(U, D, [seen.cross[i][a] for i in range(self.n)], known))
         return self._regressed(u, seen, H), seen.spread
 
     def _regressed(self, u: Update, seen: Seen, H: Rows) -> Linearised:
@@ -286,29 +281,11 @@ class Seeing:
         if self.carried:
             if u.used is None and any(r.constant is None for row in total(linear) for r in row):
                 Given(total(linear)).factors()  # tested before the rest comes in
-            V, C = linalg.udu(self.noise_covariance(u))
+            V, C = udu(self.noise_covariance(u))
             none: Vector = [t.zero] * self.q
-            rows = [_solved(V, C, [seen.noise[i][a] for i in range(self.q)], none) for a in range(self.m)]
+            rows = [solved(V, C, [seen.noise[i][a] for i in range(self.q)], none) for a in range(self.m)]
             share = [[t.value(linalg.dot(rows[a], [seen.noise[i][b] for i in range(self.q)])) for b in range(self.m)]
                      for a in range(self.m)]  # fmt: skip
             added = [[p + q for p, q in zip(r, s, strict=True)] for r, s in zip(linear.added, share, strict=True)]
             linear = replace(linear, added=added, computed=True)
         return linear
-
-
-def _solved(U: Rows, D: Vector, c: Vector, smallest: Vector) -> Vector:
-    """(U D U^T)^-1 c; an entry is 0 where D is not above `smallest`."""
-    n = len(D)
-    v: Vector = list(c)
-    for j in reversed(range(n)):
-        for i in range(j):
-            v[i] = linalg.minus(v[i], times(U[i][j], v[j]))
-    inverse = []
-    for d, low in zip(D, smallest, strict=True):
-        some, reciprocal_d = reciprocal(assume_nonnegative(d))
-        inverse.append(reciprocal_d if is_zero(low) else select(some & (d > low), 1 / d, 0))
-    v = [times(x, r) for x, r in zip(v, inverse, strict=True)]
-    for j in range(n):
-        for i in range(j):
-            v[j] = linalg.minus(v[j], times(U[i][j], v[i]))
-    return v

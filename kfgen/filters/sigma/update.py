@@ -12,6 +12,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, cast
 
 from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.factors import indefinite
 from kfgen.filters.algebra.linalg import Rows, Vector, plus, times
 from kfgen.filters.algebra.numbers import (
     assume_nonnegative,
@@ -26,7 +27,6 @@ from kfgen.filters.algebra.numbers import (
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Covariance
 from kfgen.filters.covariance.full.loops import RolledFull
-from kfgen.filters.covariance.gather import indefinite
 from kfgen.filters.frame import guards
 from kfgen.filters.kinds.ekf import Update
 from kfgen.filters.sigma.gathered import definite

@@ -8,8 +8,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
+from kfgen.filters.algebra.factors import udu, udu_computed
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_nonnegative, assume_positive, is_zero, select
+from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.noise import Additive, Computed, Factored
@@ -39,7 +41,7 @@ class Kept:
     def block(self) -> Block:
         matrix: Rows = self.initial
         if self.factored:
-            U, D = linalg.udu([list(row) for row in self.initial])
+            U, D = udu([list(row) for row in self.initial])
             matrix = [[D[i] if i == j else U[i][j] for j in range(self.k)] for i in range(self.k)]
         flat = tuple(Fraction(matrix[i][j]) for j in range(self.k) for i in range(j + 1))
         return Block(self.field, len(flat), self.doc, initial=flat)
@@ -47,7 +49,7 @@ class Kept:
     def factors(self, t: Trace) -> tuple[Rows, Vector]:
         """U, D as they are kept. What is positive at first stays so: it is only ever multiplied and added to."""
         U = [[self._load(t, i, j) if i < j else t.zero for j in range(self.k)] for i in range(self.k)]
-        _, D0 = linalg.udu([list(row) for row in self.initial])
+        _, D0 = udu([list(row) for row in self.initial])
         D = [self._load(t, j, j) for j in range(self.k)]
         for value, first in zip(D, D0, strict=True):
             assume_positive(value) if first > 0 else assume_nonnegative(value)
@@ -133,7 +135,7 @@ class AdaptedR:
         factors = None
         if self.kept.factored:
             dense = [[self.next[i, j] for j in range(self.m)] for i in range(self.m)]
-            factors = linalg.udu_computed(dense, self.smallest)
+            factors = udu_computed(dense, self.smallest)
         self.kept.store(t, self.next, factors)
         for i, e in enumerate(after):
             t.store(f"kf.{self.residual_field}", i, e if used is None else select(used[i], e, self.residuals(t)[i]))
@@ -167,7 +169,7 @@ class AdaptedQ:
         if self.kept.factored:
             U, D = self.kept.factors(t)
             D = [d * (1 - b) for d in D]
-            linalg.rank_one(U, D, [([t.value(x) for x in dx], t.value(b), -1) for dx in steps], safe=True)
+            rank_one(U, D, [([t.value(x) for x in dx], t.value(b), -1) for dx in steps], safe=True)
             return assembled(U, D), (U, D)
         Q = self.kept.entries(t)
 

@@ -8,6 +8,7 @@ from fractions import Fraction
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.dual import Dual, Evaluator, seeds
 from kfgen.filters.algebra.exact import discretise
+from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_positive, is_zero, require_nonnegative
 from kfgen.ir.trace import Trace, Value
@@ -166,7 +167,7 @@ def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Ro
     if all(is_zero(part[i][j]) for i in range(q) for j in range(q) if i != j):
         weights = [part[i][i] for i in range(q)]
     else:
-        U, weights = linalg.udu(part)
+        U, weights = udu(part)
         for d in weights:
             require_nonnegative(d, NEGATIVE)
         G = [

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 import sympy
 
-from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.dual import Dual, Evaluator, seeds
+from kfgen.filters.algebra.factors import udu, udu_computed
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import is_zero, require_nonnegative, select
 from kfgen.filters.steps import process
@@ -186,7 +186,7 @@ def decorrelated(
     if all(is_zero(R[i][j]) for i in range(m) for j in range(m) if i != j):
         return Innovation(y, H, [R[i][i] for i in range(m)], used)
     t.section("decorrelate: R = U D U^T, y <- U^-1 y, H <- U^-1 H")
-    U, D = linalg.udu(R) if smallest is None else linalg.udu_computed(R, smallest)
+    U, D = udu(R) if smallest is None else udu_computed(R, smallest)
     D = [t.value(d) for d in D]
     for d in D:
         require_nonnegative(d, "R is not positive semidefinite")

@@ -12,7 +12,8 @@ from fractions import Fraction
 from typing import Any
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Measurement, Vector
+from kfgen.filters.algebra.linalg import Vector
+from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import assume_positive, is_positive, is_zero, reciprocal, select
 from kfgen.filters.covariance.base import Covariance, Layout
 from kfgen.filters.covariance.looped import Displacement, displaced

@@ -6,7 +6,8 @@ from dataclasses import replace
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Measurement, Rows, Vector
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, is_constant, is_one, is_positive, is_zero, reciprocal, select, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.base import Block

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Measurement, Rows, Vector
+from kfgen.filters.algebra.factors import cholesky, factor_columns, udu_computed
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, is_positive, is_zero, select, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Covariance, GainChange
-from kfgen.filters.covariance.gather import cholesky, factor_columns
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.frame.triangles import upper, upper_start
 from kfgen.ir.program import Function
@@ -148,7 +149,7 @@ class Full:
 
     def factors(self, P: Symmetric) -> tuple[Rows, Vector]:
         dense = [[P[min(i, j), max(i, j)] for j in range(self.n)] for i in range(self.n)]
-        return linalg.udu_computed(dense, self.n * self.epsilon)
+        return udu_computed(dense, self.n * self.epsilon)
 
     def columns(self, P: Symmetric) -> list[tuple[Vector, Number]]:
         return factor_columns(*self.factors(P))

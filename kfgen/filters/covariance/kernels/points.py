@@ -33,7 +33,7 @@ def _factors(n: int, constant: bool) -> list[tuple[str, int, bool]]:
 
 
 def remove(kernels: Kernels, n: int, sure: bool) -> Function:
-    """U D U^T -= c c^T / s (see `linalg.downdate`). sure: no direction without spread is to be left alone."""
+    """U D U^T -= c c^T / s (see `algebra.measurement.downdate`). sure: no direction without spread is to be left alone."""
 
     def body(t: Trace) -> None:
         U, D, c = (Given(t, name) for name in ("factor", "diagonal", "c"))
@@ -133,7 +133,7 @@ def solve(kernels: Kernels, n: int) -> Function:
 
 
 def pivots(kernels: Kernels, n: int) -> Function:
-    """Whether a pivot of P is negative beyond rounding (see `gather.indefinite`)."""
+    """Whether a pivot of P is negative beyond rounding (see `algebra.factors.indefinite`)."""
 
     def body(t: Trace) -> None:
         P = Given(t, "P")

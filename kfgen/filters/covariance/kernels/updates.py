@@ -31,7 +31,7 @@ class Given:
 
 
 def absorb(kernels: Kernels, n: int, sure: bool) -> Function:
-    """U D U^T += weight_a a a^T + weight_b b b^T (Agee & Turner 1972; see `linalg.rank_one`), one pivot after another,
+    """U D U^T += weight_a a a^T + weight_b b b^T (Agee & Turner 1972; see `algebra.rank_one`), one pivot after another,
     so that an element of U is fetched once for both. sure: D is known to be positive.
 
     U <- t U + b w throughout: it loses no digits where D is far below what comes in.
@@ -77,7 +77,7 @@ def absorb(kernels: Kernels, n: int, sure: bool) -> Function:
 
 
 def bierman(kernels: Kernels, n: int, single: bool, sure: bool, weighted: bool, moves: bool) -> Function:
-    """A scalar measurement (Bierman 1977, V.2; see `linalg.bierman`). single: of one state.
+    """A scalar measurement (Bierman 1977, V.2; see `algebra.measurement`). single: of one state.
 
     sure: r is known to be positive. moves: the gain is applied to an innovation at once; else it is handed back.
     """

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from kfgen.filters.algebra.linalg import Measurement, Rows, Vector
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, constant_root, is_positive, select, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.kernels.absorber import Absorber

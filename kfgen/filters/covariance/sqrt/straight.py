@@ -9,7 +9,9 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Measurement, Rows, Vector
+from kfgen.filters.algebra.factors import columns_of, root_of_factors, udu
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import (
     Number,
     assume_nonnegative,
@@ -22,10 +24,10 @@ from kfgen.filters.algebra.numbers import (
     select,
     sqrt,
 )  # fmt: skip
+from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.base import Covariance, GainChange
-from kfgen.filters.covariance.gather import columns_of, root_of_factors
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
 from kfgen.filters.frame.triangles import upper_start
 from kfgen.ir.program import Argument, Function
@@ -55,7 +57,7 @@ class Sqrt:
 
     def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
         n = self.n
-        U, D = linalg.udu([list(row) for row in P0])
+        U, D = udu([list(row) for row in P0])
         roots = [Fraction(0) if d == 0 else constant_root(d) for d in D]
         values = [Fraction(0)] * (n * (n + 1) // 2)
         for j in range(n):
@@ -80,11 +82,11 @@ class Sqrt:
         for _, d in noise:
             require_nonnegative(d, NEGATIVE)
         t.section("process noise")
-        linalg.rank_one(U, D, [(w, d, -1) for w, d in noise], safe=True)
+        rank_one(U, D, [(w, d, -1) for w, d in noise], safe=True)
         t.section("F S S^T F^T + Q")
         for k in range(n):
             column_k: Vector = [linalg.dot(F[i][: k + 1], [P[j][k] for j in range(k + 1)]) for i in range(n)]
-            linalg.rank_one(U, D, [(column_k, t.one, k)], safe=True)
+            rank_one(U, D, [(column_k, t.one, k)], safe=True)
         return self.from_factors(t, U, D)
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Rows:

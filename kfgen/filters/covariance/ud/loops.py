@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Measurement, Rows, Vector
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_positive, is_zero
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import GainChange

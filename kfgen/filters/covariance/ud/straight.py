@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Measurement, Rows, Vector
+from kfgen.filters.algebra.factors import columns_of, factor_columns, gram_schmidt, root_of_factors, udu
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.measurement import Measurement, bierman, downdate
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_one, is_zero, require_nonnegative, select
+from kfgen.filters.algebra.rank_one import rank_one, unit_columns
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Covariance, GainChange
-from kfgen.filters.covariance.gather import columns_of, factor_columns, root_of_factors
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
 from kfgen.filters.frame.triangles import strict, strict_start, upper_start
 from kfgen.ir.program import Function
@@ -37,7 +39,7 @@ class UD:
 
     def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
         n = self.n
-        U, D = linalg.udu([list(row) for row in P0])
+        U, D = udu([list(row) for row in P0])
         flat = tuple(Fraction(U[i][j]) for j in range(n) for i in range(j))
         out = []
         if n > 1:
@@ -65,7 +67,7 @@ class UD:
         if upper:
             if not identity:
                 t.section("F U, unit upper triangular as F is")
-                U = [[linalg.unit_columns(F, U, j)[i] if i < j else t.zero for j in range(n)] for i in range(n)]
+                U = [[unit_columns(F, U, j)[i] if i < j else t.zero for j in range(n)] for i in range(n)]
             columns = [([*(UQ[i][j] for i in range(j)), t.one, *[t.zero] * (n - j - 1)], DQ[j], j) for j in range(n)]
             columns = [c for c in columns if not is_zero(c[1])]
             self._absorb(t, U, D, columns + [(w, d, -1) for w, d in noise], "process noise")
@@ -75,14 +77,14 @@ class UD:
         for k in range(0, n, self.group):
             part = range(k, min(k + self.group, n))
             t.section("F U D U^T F^T + Q" + ("" if n <= self.group else f", columns {k} to {part[-1]}"))
-            linalg.rank_one(U1, D1, [(linalg.unit_columns(F, U, c), D[c], c) for c in part])
+            rank_one(U1, D1, [(unit_columns(F, U, c), D[c], c) for c in part])
         return U1, D1
 
     def _absorb(self, t: Trace, U: Rows, D: Vector, columns: list[tuple[Vector, Value, int]], what: str) -> None:
         for k in range(0, len(columns), self.group):
             part = columns[k : k + self.group]
             t.section(what + ("" if len(columns) <= self.group else f", columns {k} to {k + len(part) - 1}"))
-            linalg.rank_one(U, D, part)
+            rank_one(U, D, part)
 
     def update(self, t: Trace, P: tuple[Rows, Vector], measurements: list[Measurement]
                ) -> tuple[tuple[Rows, Vector], Rows, Vector]:  # fmt: skip
@@ -95,7 +97,7 @@ class UD:
                 gains.append(K)
                 s.append(variance)
         else:
-            gains, s = linalg.bierman(U, D, measurements)
+            gains, s = bierman(U, D, measurements)
         return (U, D), gains, s
 
     def _joseph(self, U: Rows, D: Vector, measurement: Measurement) -> tuple[Vector, Value]:
@@ -115,7 +117,7 @@ class UD:
              else -(U[i][j]) if j > i else -1 if j == i else 0 for j in range(n)] + [K[i]]
             for i in range(n)
         ]  # fmt: skip
-        U1, D1 = linalg.gram_schmidt(rows, [*D, linalg.times(g, r)])
+        U1, D1 = gram_schmidt(rows, [*D, linalg.times(g, r)])
         for i in range(n):
             D[i] = D1[i]
             U[i][:] = U1[i]
@@ -188,7 +190,7 @@ class UD:
         if not sure:
             dense = self.entries(P)
             smallest = [dense[j, j] * tolerance for j in range(self.n)]
-        failed, gone = linalg.downdate(U, D, c, s, 1024 * tolerance, smallest)  # the points' rounding is in c
+        failed, gone = downdate(U, D, c, s, 1024 * tolerance, smallest)  # the points' rounding is in c
         t.flag(gone, "REGULARIZED")
         return (U, D), failed
 
