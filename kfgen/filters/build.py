@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,21 +13,24 @@ from kfgen.filters.algebra.numbers import is_zero
 from kfgen.filters.bank.imm import Imm
 from kfgen.filters.base import FilterCode
 from kfgen.filters.choice import choose, told, with_privates
-from kfgen.filters.covariance.base import GainChange, Layout
-from kfgen.filters.covariance.full.loops import RolledFull
-from kfgen.filters.covariance.full.straight import Full
-from kfgen.filters.covariance.looped import Kernels
-from kfgen.filters.covariance.sqrt.loops import RolledSqrt
-from kfgen.filters.covariance.sqrt.straight import Sqrt
-from kfgen.filters.covariance.ud.loops import RolledUD
-from kfgen.filters.covariance.ud.straight import UD
+from kfgen.filters.covariance.base import Form
+from kfgen.filters.covariance.full.loops import LoopedFull
+from kfgen.filters.covariance.full.straight import StraightFull
+from kfgen.filters.covariance.kernels.function import Kernels
+from kfgen.filters.covariance.loops.looped import Looping
+from kfgen.filters.covariance.parts import GainChange
+from kfgen.filters.covariance.sqrt.loops import LoopedSqrt
+from kfgen.filters.covariance.sqrt.straight import StraightSqrt
+from kfgen.filters.covariance.ud.loops import LoopedUD
+from kfgen.filters.covariance.ud.straight import StraightUD
 from kfgen.filters.frame.shared import unused
 from kfgen.filters.kinds.ekf import Ekf
 from kfgen.filters.kinds.ekf2 import Ekf2
 from kfgen.filters.kinds.iekf import Iekf
+from kfgen.filters.kinds.single import SingleFilter
 from kfgen.filters.kinds.steady import Steady
 from kfgen.filters.order import best_order
-from kfgen.filters.sigma.ukf import Ukf
+from kfgen.filters.sigma.ukf import SequentialUkf, Ukf
 from kfgen.filters.steps import process
 from kfgen.filters.steps.sensor import SensorCode
 from kfgen.ir.nodes import Constants, Table
@@ -38,9 +41,11 @@ from kfgen.model.bank import build_bank
 from kfgen.scalars import Scalar
 from kfgen.spec.types import Spec
 
-_FILTERS: dict[str, Callable[[Model, Layout, Scalar], Ekf]] = {
-    "kf": Ekf, "ekf": Ekf, "iekf": Iekf, "ekf2": Ekf2, "ukf": Ukf,
+_FILTERS: dict[str, Callable[[Model, Any, Scalar], SingleFilter]] = {
+    "kf": Ekf, "ekf": Ekf, "iekf": Iekf, "ekf2": Ekf2, "ukf": Ukf, "sequential": SequentialUkf,
 }  # fmt: skip
+
+_IN_LOOPS: dict[str, Callable[[Any, Looping], Form[Any]]] = {"ud": LoopedUD, "full": LoopedFull, "sqrt": LoopedSqrt}
 
 
 def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
@@ -76,12 +81,11 @@ def _single(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> Emitter:
     _check_measurements(model)
     if spec.filter.gain is not None:
         return lambda unroll: Steady(model, scalar).code(taken)
-    layout = _layout(model, scalar)
+    form = _form(model, scalar)
 
     def emitted(unroll: str) -> FilterCode:
-        own = _rolled((model,), [layout], scalar, taken)[0] if unroll == "none" else layout
-        code = _filter(model, layout, own, scalar, unroll).code(taken)
-        return replace(code, constants={**code.constants, **own.tables})
+        (own,) = _in_loops((model,), [form], scalar, taken) if unroll == "none" else [form]
+        return _filter(model, own, scalar, unroll).code(taken)
 
     return emitted
 
@@ -92,68 +96,60 @@ def _bank(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> Emitter:
     for model in bank.modes:
         _check_measurements(model)
     order = _common_order(bank.modes)
-    layouts = [_layout(model, scalar, order) for model in bank.modes]
+    forms = [_form(model, scalar, order) for model in bank.modes]
 
     def emitted(unroll: str) -> FilterCode:
-        own = _rolled(bank.modes, layouts, scalar, taken, bank.names) if unroll == "none" else layouts
-        filters = [
-            _filter(model, layout, rolled, scalar, unroll)
-            for model, layout, rolled in zip(bank.modes, layouts, own, strict=True)
-        ]
-        code = Imm(bank, filters, layouts, scalar).code(taken)
-        tables = {name: table for layout in own for name, table in layout.tables.items()}
-        return replace(code, constants={**code.constants, **tables})
+        own = _in_loops(bank.modes, forms, scalar, taken, bank.names) if unroll == "none" else forms
+        filters = [_filter(model, form, scalar, unroll) for model, form in zip(bank.modes, own, strict=True)]
+        return Imm(bank, filters, scalar).code(taken)
 
     return emitted
 
 
-def _filter(model: Model, layout: Layout, own: Layout, scalar: Scalar, unroll: str) -> Ekf:
-    """own: the layout, in loops if asked for; sigma points come from the layout as it is."""
+def _filter(model: Model, form: Form[Any], scalar: Scalar, unroll: str) -> SingleFilter:
+    """The filter of one model. unroll: what is asked for, in place of the spec's."""
     spec = model.spec
     asked = replace(model, spec=replace(spec, code=replace(spec.code, unroll=unroll)))
-    filter_ = _FILTERS[spec.filter.type](asked, layout if spec.filter.type == "ukf" else own, scalar)
-    filter_.plain = own
-    return filter_
+    make = _FILTERS["sequential" if spec.filter.sequential else spec.filter.type]
+    return make(asked, form, scalar)
 
 
-def _rolled(
-    models: tuple[Model, ...], layouts: list[Layout], scalar: Scalar, taken: frozenset[str], modes: tuple[str, ...] = ()
-) -> list[Layout]:
-    """The same layouts in loops, which share their private functions; where there is nothing to loop over, as they
+def _in_loops(
+    models: tuple[Model, ...], forms: Sequence[Form[Any]], scalar: Scalar, taken: frozenset[str],
+    modes: tuple[str, ...] = (),
+) -> list[Form[Any]]:  # fmt: skip
+    """The same forms in loops, which share their private functions; where there is nothing to loop over, as they
     are."""
-    if layouts[0].n == 1:
-        return layouts
+    if forms[0].n == 1:
+        return list(forms)
     kernels = Kernels(scalar.smallest, taken, several=len(models) > 1)
     steps = any(model.options.adapt_Q is not None for model in models)
     weighted = any(model.options.influence is not None for model in models)
-    out: list[Layout] = []
-    for place, (model, layout) in enumerate(zip(models, layouts, strict=True)):
-        names = [model.states[i] for i in layout.order]
+    out = []
+    for place, (model, form) in enumerate(zip(models, forms, strict=True)):
+        names = [model.states[i] for i in form.order]
         table = (model.spec.name, f"reach_{modes[place]}" if modes else "reach")
-        if isinstance(layout, UD):
-            layout = RolledUD(layout.order, layout.form, layout.change, names, kernels, weighted, steps, table)
-        elif isinstance(layout, Sqrt):
-            layout = RolledSqrt(layout.n, names, kernels, weighted, steps, table)
-        elif isinstance(layout, Full):
-            layout = RolledFull(layout, names, kernels, steps)
-        out.append(layout)
+        how = Looping(names, kernels, weighted, steps, table)
+        out.append(_IN_LOOPS[model.spec.filter.covariance](form, how))
     return out
 
 
-def _layout(model: Model, scalar: Scalar, order: list[int] | None = None) -> Layout:
-    """How the covariance is kept, and in which order of the states, where that is not given."""
+def _form(model: Model, scalar: Scalar, order: list[int] | None = None) -> Form[Any]:
+    """How the covariance is kept, and in which order of the states, where that is not given; straight-line code."""
     n, chosen = len(model.states), model.spec.filter
     if chosen.covariance == "sqrt":
-        return Sqrt(n)
+        return StraightSqrt(n)
     if chosen.type == "ukf":  # sigma points depend on the order
-        straight = list(range(n))
-        return UD(straight, "bierman") if chosen.covariance == "ud" else Full(n, "standard", scalar.epsilon, straight)
+        inner = list(range(n))
+        if chosen.covariance == "ud":
+            return StraightUD(inner, "bierman")
+        return StraightFull(n, "standard", scalar.epsilon, inner)
     assert chosen.update is not None
     if order is None:
         order = _order((model,))
     if chosen.covariance == "ud":
-        return UD(order, chosen.update, _gain_change(model, order))
-    return Full(n, chosen.update, scalar.epsilon, order, _gain_change(model, list(range(n))))
+        return StraightUD(order, chosen.update, _gain_change(model, order))
+    return StraightFull(n, chosen.update, scalar.epsilon, order, _gain_change(model, list(range(n))))
 
 
 def _gain_change(model: Model, order: list[int]) -> GainChange | None:

@@ -10,7 +10,7 @@ import pytest
 
 from kfgen.filters.algebra.factors import cholesky, columns_of, root_of_factors
 from kfgen.filters.algebra.measurement import downdate
-from kfgen.filters.covariance.sqrt.straight import Sqrt
+from kfgen.filters.covariance.sqrt.straight import StraightSqrt
 from kfgen.filters.sigma.points import PointSet, point_set
 from kfgen.ir.interpret import Memory, run
 from kfgen.ir.program import Function
@@ -271,7 +271,7 @@ def downdated(S: np.ndarray, w: list, s: float = 1.0, tolerance: float = 1e-14) 
     t, n = Trace(), len(S)
     inner = [[t.value(Fraction(float(S[n - 1 - i, n - 1 - j]))) for j in range(n)] for i in range(n)]
     c = [t.value(Fraction(v)) for v in reversed(w)]
-    rows, failed = Sqrt(n).downdated(t, inner, c, t.value(Fraction(s)), Fraction(tolerance), False, inner)
+    rows, failed = StraightSqrt(n).downdated(t, inner, c, t.value(Fraction(s)), Fraction(tolerance), False, inner)
     values = [[float(t.value(v).constant) for v in row] for row in rows]
     flagged = any(condition.constant != 0 for condition, _ in t.raised)
     return np.array(values)[::-1, ::-1], failed.constant != 0, flagged

@@ -21,15 +21,12 @@ from kfgen.filters.algebra.numbers import (
 class Measurement:
     """A scalar measurement: its row h (n,), its variance r, and its weight g, 1 but for robust updates.
 
-    An update with it makes s = r + g h P h^T, K = P h^T / s, P - g K s K^T. nu, moved: the innovation, and what
-    earlier ones have moved the state by, for layouts that apply the gain themselves.
+    An update with it makes s = r + g h P h^T, K = P h^T / s, P - g K s K^T.
     """
 
     h: Vector
     r: Number
     g: Number = 1
-    nu: Number = None
-    moved: Vector | None = None
 
 
 def bierman(U: Rows, D: Vector, measurements: list[Measurement]) -> tuple[Rows, Vector]:

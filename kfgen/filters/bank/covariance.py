@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from kfgen.filters.algebra.numbers import select
+from kfgen.filters.bank.mode import Mode
 from kfgen.filters.bank.trace import BankTrace
 from kfgen.filters.base import CONST_KF, KF
 from kfgen.filters.steps.covariance import covariance_argument
@@ -12,9 +11,6 @@ from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Value
 from kfgen.model import Model
-
-if TYPE_CHECKING:
-    from kfgen.filters.bank.imm import Mode
 
 
 class BankCovariance:
@@ -51,7 +47,7 @@ class BankCovariance:
         t.section("store")
         for mode in self.modes:
             with t.of(mode.scope()):
-                mode.filter.layout.put(t, *read[tuple(mode.filter.order)])
+                mode.filter.form.put(t, *read[tuple(mode.filter.order)])
         for path in self.outdated:
             t.store(path, None, t.wrapped(t.pool.boolean(False)))
         return Function(
@@ -78,7 +74,7 @@ class BankCovariance:
                 code = mode.filter.covariance
                 at = code.place(t)
                 with t.loop("j", 0, n) as j, t.loop("i", 0, j + 1) as i:
-                    own = t.name(mode.filter.layout.get(t, i, j), "value")
+                    own = t.name(mode.filter.form.get(t, i, j), "value")
                     after = t.name(t.element("P", at(i) * n + at(j)) + m * own, "sum")
                     t.store("P", at(i) * n + at(j), after)
                     t.store("P", at(j) * n + at(i), after)

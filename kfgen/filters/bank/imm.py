@@ -8,22 +8,21 @@ are those of the modes' own filters, taken side by side: nothing is stored befor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import replace
 
 import sympy
 
 from kfgen.filters.algebra.dual import Dual, Evaluator
-from kfgen.filters.algebra.numbers import Number, assume_positive, select
+from kfgen.filters.algebra.numbers import Number, assume_positive, is_zero, select
 from kfgen.filters.bank.covariance import BankCovariance
-from kfgen.filters.bank.loops import Source, alike, mixed_in_loops
+from kfgen.filters.bank.loops import Source, mixed_in_loops
 from kfgen.filters.bank.mixing import Estimate, mixed, normalised, spread, transition
+from kfgen.filters.bank.mode import Mode
 from kfgen.filters.bank.trace import BankTrace, Scope
 from kfgen.filters.base import KF, Block, FilterCode, ModeNote
-from kfgen.filters.covariance.base import Layout, Rolled
 from kfgen.filters.frame import guards
 from kfgen.filters.frame.shared import shared
-from kfgen.filters.kinds.ekf import LONG_FUNCTIONS, Ekf
+from kfgen.filters.kinds.single import LONG_FUNCTIONS, SingleFilter
 from kfgen.filters.steps import process
 from kfgen.filters.steps.gate import gate, smallest, store_outcome
 from kfgen.filters.steps.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
@@ -32,48 +31,24 @@ from kfgen.filters.steps.state import StateCode
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
-from kfgen.model import Model
 from kfgen.model.bank import BankModel
 from kfgen.model.model import SensorModel
 from kfgen.scalars import Scalar
 
 
-@dataclass(frozen=True)
-class Mode:
-    """A mode's filter and its fields in the struct."""
-
-    name: str
-    filter: Ekf
-    blocks: tuple[Block, ...]
-    layout: Layout  # of the mixtures that are not made in loops
-
-    def scope(self) -> Scope:
-        return Scope(self.name, frozenset(block.name for block in self.blocks))
-
-    @property
-    def model(self) -> Model:
-        return self.filter.model
-
-    def path(self, field: str) -> str:
-        return f"kf.modes.{self.name}.{field}"
-
-
 class Imm:
-    """Emits a bank of filters. bank: the model; filters: those of the modes; layouts: theirs, not in loops."""
+    """Emits a bank of filters. bank: the model; filters: those of the modes."""
 
-    def __init__(
-        self, bank: BankModel, filters: Sequence[Ekf], layouts: Sequence[Layout], scalar: Scalar
-    ) -> None:
+    def __init__(self, bank: BankModel, filters: Sequence[SingleFilter], scalar: Scalar) -> None:
         self.bank = bank
         self.model = bank.head
         self.scalar = scalar
         # what is to stay above 0 must not become 0 by the rounding of mu
         self.floor = max(bank.mu_floor, scalar.probability) if bank.mu_floor > 0 else bank.mu_floor
         self.lively = bank.lively(scalar.smallest, scalar.probability)
-        self.modes = [
-            Mode(name, f, f.own_blocks(), layout) for name, f, layout in zip(bank.names, filters, layouts, strict=True)
-        ]
-        self.mixes_in_loops = alike([cast(Rolled, f.plain) for f in filters])
+        self.modes = [Mode(name, f, f.own_blocks()) for name, f in zip(bank.names, filters, strict=True)]
+        forms = [f.form for f in filters]
+        self.mixers = [form.mixer(forms) for form in forms]
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
         fields = [
             replace(block, name=f"modes.{mode.name}.{block.name}") for mode in self.modes for block in mode.blocks
@@ -97,9 +72,10 @@ class Imm:
             functions.append(self.redraw(taken))
         remarks = [f"{mode.name}: {text}" for mode in self.modes for text in mode.filter.remarks()]
         straight = list(range(len(self.model.states)))
+        tables = {name: table for mode in self.modes for name, table in mode.filter.form.tables.items()}
         notes = []
         for mode in self.modes:
-            order = mode.filter.order if mode.filter.layout.reorders else straight
+            order = mode.filter.order if mode.filter.form.reorders else straight
             notes.append(ModeNote(mode.name, mode.filter.description(), tuple(order), mode.model))
         return FilterCode(
             model=self.model,
@@ -107,7 +83,7 @@ class Imm:
             functions=tuple(functions),
             order=tuple(straight),
             description=f"Interacting multiple model of {len(self.modes)} modes",
-            constants=self.covariance.constants(),
+            constants={**self.covariance.constants(), **tables},
             remarks=tuple(remarks),
             modes=tuple(notes),
             notes=LONG_FUNCTIONS if len(self.modes) * len(straight) >= 8 else (),
@@ -133,11 +109,11 @@ class Imm:
         for mode, scope in zip(self.modes, scopes, strict=True):
             with t.of(scope):
                 x = [t.name(t.element("kf.x", i), name) for i, name in enumerate(self.model.states)]
-                layout = mode.layout
-                P = layout.load(t)
-                if not layout.factored:  # entries are read when they are first asked for: here
-                    _ = [P[i, j] for j in range(layout.n) for i in range(j + 1)]
-                out.append(Estimate(x, layout, P))
+                form = mode.filter.form.straight()
+                P = form.load(t)
+                if not form.factored:  # entries are read when they are first asked for: here
+                    _ = [P[i, j] for j in range(form.n) for i in range(j + 1)]
+                out.append(Estimate(x, form, P))
         return out
 
     def combined(self, t: BankTrace, made: list[Made], mu: list[Value]) -> list[Value]:
@@ -204,28 +180,28 @@ class Imm:
     def _mix_all(self, t: BankTrace, scopes: list[Scope], w: list[list[Number]]) -> None:
         """Have every mode start from its mixture."""
         weights = [[row[j] for row in w] for j in range(len(scopes))]
-        if not self.mixes_in_loops:
+        mixers = [mixer for mixer in self.mixers if mixer is not None]
+        if len(mixers) < len(self.modes):
             parts = self._loaded(t, scopes)
             for j, (mode, scope) in enumerate(zip(self.modes, scopes, strict=True)):
                 self._mix(t, mode, scope, parts, weights[j], j)
             return
         sources = [
-            Source(scope, cast(Rolled, mode.filter.plain), mode.filter.covariance.place(t))
-            for mode, scope in zip(self.modes, scopes, strict=True)
+            Source(t, scope, mode.filter.covariance.place(t)) for mode, scope in zip(self.modes, scopes, strict=True)
         ]
         mixtures: list[dict[str, Array]] = []
-        for j, scope in enumerate(scopes):
-            alone = all(i == j or _is_nothing(weight) for i, weight in enumerate(weights[j]))
+        for j, (mixer, scope) in enumerate(zip(mixers, scopes, strict=True)):
+            alone = all(i == j or is_zero(weight) for i, weight in enumerate(weights[j]))
             if not alone:
                 with t.of(scope):
                     t.section("where it starts from")
-            mixtures.append({} if alone else mixed_in_loops(t, self.model, sources, weights[j], j))
+            mixtures.append({} if alone else mixed_in_loops(t, self.model, sources, weights[j], j, mixer))
         for scope, arrays in zip(scopes, mixtures, strict=True):
             scope.arrays.update(arrays)
 
     def _mix(self, t: BankTrace, mode: Mode, scope: Scope, parts: list[Estimate], w: list[Number], own: int) -> None:
         """Have the mode start from its mixture; where none joins it, from its own estimate as it stands."""
-        if all(i == own or _is_nothing(weight) for i, weight in enumerate(w)):
+        if all(i == own or is_zero(weight) for i, weight in enumerate(w)):
             return
         with t.of(scope):
             t.section("where it starts from")
@@ -233,9 +209,9 @@ class Imm:
             x = [v if p is None else t.wrap(v, p) for v, p in zip(mixture.mean, self.model.periods, strict=True)]
             P = mixed(t, parts, w, mixture, own)
             with t.capture() as captured:
-                mode.layout.store(t, P, mode.filter.names, after_predict=False)
+                mode.filter.form.straight().store(t, P, mode.filter.names, after_predict=False)
             scope.given = {"kf.x": dict(enumerate(x)), **captured}
-        if mode.filter.predicts_in_loops or mode.filter.plain.rolled:
+        if mode.filter.indexed:
             t.materialise(scope, captured)
 
     # update ------------------------------------------------------------------------------------------
@@ -321,7 +297,3 @@ class Imm:
 def _advance(t: BankTrace, scope: Scope, run: Phases) -> Judged | Made:
     with t.of(scope):
         return next(run)
-
-
-def _is_nothing(weight: Number) -> bool:
-    return bool(weight.constant == 0 if isinstance(weight, Value) else weight == 0)

@@ -1,4 +1,4 @@
-"""Mixtures of the estimates of modes: weights, the mean, the covariance in any layout (Blom & Bar-Shalom 1988).
+"""Mixtures of the estimates of modes: weights, the mean, the covariance in any form (Blom & Bar-Shalom 1988).
 
 x = sum_i w_i x_i, P = sum_i w_i (P_i + d_i d_i^T), d_i = x_i - x. The estimates are taken in one after another: a
 part of weight w joins a mixture of weight W at the distance e with the spread W w / (W + w) e e^T. So the spread of
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.linalg import Vector, plus, times
@@ -23,18 +24,18 @@ from kfgen.filters.algebra.numbers import (
 )  # fmt: skip
 from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.covariance.base import Covariance, Layout
+from kfgen.filters.covariance.base import Straight
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Of a mode: x (n,) in the spec's order, P in its layout."""
+    """Of a mode: x (n,) in the spec's order, P in its form."""
 
     x: list[Value]
-    layout: Layout
-    P: Covariance
+    form: Straight[Any]
+    P: Any
 
 
 @dataclass(frozen=True)
@@ -105,15 +106,15 @@ def heaviest(values: list[Value], weights: list[Number]) -> Value:
     return value
 
 
-def mixed(t: Trace, parts: list[Estimate], weights: list[Number], spreads: Spread, own: int) -> Covariance:
-    """The covariance of a mixture in the layout of one of its parts."""
-    layout = parts[own].layout
-    columns = [(_ordered(column, layout), weight) for column, weight in spreads.columns]
-    if not layout.factored:
+def mixed(t: Trace, parts: list[Estimate], weights: list[Number], spreads: Spread, own: int) -> Any:
+    """The covariance of a mixture in the form of one of its parts."""
+    form = parts[own].form
+    columns = [(_ordered(column, form), weight) for column, weight in spreads.columns]
+    if not form.factored:
         dense = [_Dense(part) for part in parts]
 
         def entry(a: int, b: int) -> Value:
-            i, j = layout.order[a], layout.order[b]
+            i, j = form.order[a], form.order[b]
             total: Number = 0
             for P, w in zip(dense, weights, strict=True):
                 if not is_zero(w):
@@ -122,38 +123,38 @@ def mixed(t: Trace, parts: list[Estimate], weights: list[Number], spreads: Sprea
                 total = plus(total, times(times(column[a], w), column[b]))
             return t.value(total)
 
-        return Symmetric(layout.n, entry)
-    U, D = layout.factors(parts[own].P)
+        return form.from_entries(Symmetric(form.n, entry))
+    U, D = form.factors(parts[own].P)
     D = [times(weights[own], d) for d in D]
     if is_zero(weights[own]):
-        U, D = linalg.zeros(layout.n, layout.n), [0] * layout.n
+        U, D = linalg.zeros(form.n, form.n), [0] * form.n
     added: list[tuple[Vector, Number, int]] = []
     for i, part in enumerate(parts):
         if i == own or is_zero(weights[i]):
             continue
-        same = part.layout.order == layout.order
-        for k, (column, weight) in enumerate(part.layout.columns(part.P)):
-            straight: Vector = [0] * layout.n
-            for place, value in zip(part.layout.order, column, strict=True):
+        same = part.form.order == form.order
+        for k, (column, weight) in enumerate(part.form.columns(part.P)):
+            straight: Vector = [0] * form.n
+            for place, value in zip(part.form.order, column, strict=True):
                 straight[place] = value
-            added.append((_ordered(straight, layout), times(weight, weights[i]), k if same else -1))
+            added.append((_ordered(straight, form), times(weight, weights[i]), k if same else -1))
     added += [(column, weight, -1) for column, weight in columns]
-    for c in range(0, len(added), layout.group):
-        rank_one(U, D, added[c : c + layout.group], safe=not layout.reorders)
-    return layout.from_factors(t, U, D)
+    for c in range(0, len(added), form.group):
+        rank_one(U, D, added[c : c + form.group], safe=not form.reorders)
+    return form.from_factors(t, U, D)
 
 
-def _ordered(column: Vector, layout: Layout) -> Vector:
-    """From the spec's order to the layout's."""
-    return [column[i] for i in layout.order]
+def _ordered(column: Vector, form: Straight[Any]) -> Vector:
+    """From the spec's order to the form's."""
+    return [column[i] for i in form.order]
 
 
 class _Dense:
     """Entries of a covariance by states of the spec."""
 
     def __init__(self, part: Estimate) -> None:
-        self.P = part.layout.entries(part.P)
-        self.place = {state: i for i, state in enumerate(part.layout.order)}
+        self.P = part.form.entries(part.P)
+        self.place = {state: i for i, state in enumerate(part.form.order)}
 
     def __call__(self, i: int, j: int) -> Number:
         return self.P[self.place[i], self.place[j]]

@@ -1,77 +1,48 @@
-"""A predicted covariance gathered from the deviations of sigma points, in loops: Q + sum of w d d^T."""
+"""A predicted covariance gathered from the deviations of sigma points into numbers: Q + sum of w d d^T."""
 
 from __future__ import annotations
 
-from fractions import Fraction
-from typing import Protocol
+from collections.abc import Callable
+from typing import Generic
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.factors import cholesky, indefinite, root_of_factors, udu
+from kfgen.filters.algebra.factors import indefinite
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.measurement import downdate
-from kfgen.filters.algebra.numbers import (
-    assume_nonnegative,
-    assume_positive,
-    is_constant,
-    is_positive,
-    is_zero,
-    require_nonnegative,
-    select,
-)  # fmt: skip
+from kfgen.filters.algebra.numbers import assume_nonnegative, assume_positive, is_positive, is_zero
 from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.covariance.base import Covariance, Layout
-from kfgen.filters.covariance.noise import NEGATIVE, Additive
+from kfgen.filters.covariance.base import P
+from kfgen.filters.covariance.noise import Additive
+from kfgen.filters.covariance.parts import Gathering, Weight
 from kfgen.filters.frame import guards
-from kfgen.ir.trace import Trace, Value, Variable
-
-Weight = Value | Fraction
+from kfgen.ir.trace import Array, Trace, Value, Variable
 
 
-class Gatherer(Protocol):
-    """Starts at Q and takes deviations in the inner order, inside of loops or not."""
-
-    def add(self, d: Vector, weight: Weight) -> None:
-        """+ w d d^T, w >= 0."""
-        ...
-
-    def subtract(self, d: Vector, weight: Weight) -> None:
-        """- w d d^T, w > 0; it fails where the result is not positive semidefinite."""
-        ...
-
-    def result(self) -> tuple[Covariance, list[Value]]:
-        """The covariance, and conditions of failure."""
-        ...
-
-
-def gatherer(t: Trace, layout: Layout, Q: Additive, columns: list[tuple[Vector, Value]], names: list[str],
-             common: Fraction | None, epsilon: Fraction, checked: bool) -> Gatherer:  # fmt: skip
-    """One for the layout. columns: (w, d) of noise that is not additive.
-
-    common: the weight of all that is added in loops, if it is the same. checked: a full covariance may come out
-    indefinite by negative weights, and is tested.
-    """
-    if layout.factored:
-        return _Factors(t, layout, Q, columns, names, epsilon)
-    return _Entries(t, layout, Q, columns, names, common, epsilon, checked)
-
-
-class _Entries:
+class GatheredEntries:
     """For a full P: sums of products, one variable per entry; Q and a common weight come in at the end."""
 
-    def __init__(self, t: Trace, layout: Layout, Q: Additive, columns: list[tuple[Vector, Value]], names: list[str],
-                 common: Fraction | None, epsilon: Fraction, checked: bool) -> None:  # fmt: skip
+    rewrites = False
+
+    def __init__(self, t: Trace, Q: Additive, columns: list[tuple[Vector, Value]], how: Gathering) -> None:
         self.t = t
-        self.n = layout.n
-        self.epsilon = epsilon
-        self.checked = checked
-        self.common = common
+        names = how.names
+        self.n = len(names)
+        self.epsilon = how.epsilon
+        self.checked = how.checked
+        self.common = how.common
         self.outside: list[tuple[Vector, Weight]] = list(columns)
         self.Q = Q.entries()
         self.sums = {
             (i, j): t.variable(f"sum_{names[i]}_{names[j]}", 0) for j in range(self.n) for i in range(j + 1)
         }
         self.depth = t.depth
+
+    def add_row(self, array: Array, at: Value, d: Vector, weight: Weight) -> None:
+        self.add(d, weight)
+
+    def subtract_row(self, array: Array, at: Value, d: Vector, weight: Weight) -> None:
+        self.subtract(d, weight)
 
     def add(self, d: Vector, weight: Weight) -> None:
         if self.t.depth == self.depth:
@@ -102,15 +73,21 @@ class _Entries:
         return P, indefinite(P, self.n * self.epsilon) if self.checked else []
 
 
-class _Factors:
+class GatheredFactors(Generic[P]):
     """For U D U^T and for a triangular root: rank-one updates of U and D, kept in variables."""
 
-    def __init__(self, t: Trace, layout: Layout, Q: Additive, columns: list[tuple[Vector, Value]], names: list[str],
-                 epsilon: Fraction) -> None:  # fmt: skip
+    rewrites = False
+
+    def __init__(
+        self, t: Trace, Q: Additive, columns: list[tuple[Vector, Value]], how: Gathering,
+        finish: Callable[[Rows, Vector], P],
+    ) -> None:  # fmt: skip
+        """finish: what the form makes of U, D."""
         self.t = t
-        self.layout = layout
-        n = self.n = layout.n
-        self.epsilon = epsilon
+        self.finish = finish
+        names = how.names
+        n = self.n = len(names)
+        self.epsilon = how.epsilon
         U, D = Q.factors()
         for column, d in columns:
             assume_nonnegative(d)
@@ -137,6 +114,12 @@ class _Factors:
         for variable, d in zip(self.D, D, strict=True):
             variable.set(d)
 
+    def add_row(self, array: Array, at: Value, d: Vector, weight: Weight) -> None:
+        self.add(d, weight)
+
+    def subtract_row(self, array: Array, at: Value, d: Vector, weight: Weight) -> None:
+        self.subtract(d, weight)
+
     def add(self, d: Vector, weight: Weight) -> None:
         U, D = self._read()
         rank_one(U, D, [(d, self.t.value(weight), -1)], safe=True)
@@ -154,22 +137,5 @@ class _Factors:
         self.sure = [False] * self.n
         self._write(U, D)
 
-    def result(self) -> tuple[Covariance, list[Value]]:
-        U, D = self._read()
-        return self.layout.from_factors(self.t, U, D), self.failures
-
-
-def noise_root(C: Rows, form: str, tolerance: Fraction) -> tuple[Rows, list[Value]]:
-    """A root of the covariance of noise inputs (q, q), of the kind that the form of the covariance has; and what of C
-    has to be tested to be finite. That C is a covariance is left to a guard."""
-    values = [v for row in C for v in row if v.constant is None]
-    if not C:
-        return [], values
-    U, D = udu(C)
-    for d in D:
-        require_nonnegative(d, NEGATIVE)
-    if form == "ud":
-        D = [d if is_constant(d) else select(d > 0, d, 0) for d in D]
-        return root_of_factors(U, D), values
-    S, _ = cholesky(lambda i, j: C[i][j], len(C), tolerance)
-    return S, values
+    def result(self) -> tuple[P, list[Value]]:
+        return self.finish(*self._read()), self.failures

@@ -37,7 +37,7 @@ class Ekf2(Ekf):
         noises = [w.name for w in model.noises]
         evaluator = Evaluator(t, model, prior.duals)
         Qw = [[evaluator.value(e) for e in row] for row in model.noise_covariance]
-        terms = self._terms(t, result.after, self.layout.entries(self.layout.load(t)), noises, Qw)
+        terms = self._terms(t, result.after, self.form.entries(self.form.load(t)), noises, Qw)
         Given([[result.Q[i][j] for j in self.order] for i in self.order]).entries()  # tested before the rest comes in
         Q = [[q + t.value(g) for q, g in zip(a, b, strict=True)] for a, b in zip(result.Q, terms.spread, strict=True)]
         return replace(result, x=[a + m for a, m in zip(result.x, terms.mean, strict=True)], Q=Q)
@@ -53,7 +53,7 @@ class Ekf2(Ekf):
         if not any(d.hessian for d in linear.predicted):
             return linear
         noises = [w.name for w in u.sensor.noises]
-        terms = self._terms(u.t, linear.predicted, self.layout.entries(u.P), noises, u.code.noise_covariance())
+        terms = self._terms(u.t, linear.predicted, self.form.entries(u.P), noises, u.code.noise_covariance())
         predicted = [d.value + m for d, m in zip(linear.predicted, terms.mean, strict=True)]
         m = len(predicted)
         added = [[linear.added[i][j] + u.t.value(terms.spread[i][j]) for j in range(m)] for i in range(m)]

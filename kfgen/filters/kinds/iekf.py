@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import replace
+from typing import Any
 
 from kfgen.filters.algebra.linalg import dot, plus
 from kfgen.filters.algebra.numbers import is_zero
-from kfgen.filters.kinds.ekf import Ekf, Update
-from kfgen.filters.steps.phases import Judged, Made
+from kfgen.filters.kinds.ekf import Ekf, Final, Update
 from kfgen.filters.steps.sensor import Innovation
 from kfgen.filters.steps.sequence import Updated
 
@@ -21,7 +20,7 @@ class Iekf(Ekf):
     def description(self) -> str:
         return f"{super().description()}, {self.model.spec.filter.iterations} linearisations"
 
-    def final(self, u: Update, innovation: Innovation, plain: Updated) -> Generator[Judged | Made, None, Updated]:
+    def final(self, u: Update, innovation: Innovation, plain: Updated[Any]) -> Final:
         iterations = self.model.spec.filter.iterations or 1
         if iterations == 1:
             return (yield from super().final(u, innovation, plain))
@@ -32,12 +31,12 @@ class Iekf(Ekf):
             result = self._step(u, result)
         return result
 
-    def _step(self, u: Update, before: Updated) -> Updated:
+    def _step(self, u: Update, before: Updated[Any]) -> Updated[Any]:
         """The linear update about x^- + before.moved."""
         t, model = u.t, self.model
         x = list(u.x)
-        moved = list(before.moved)  # x_i - x^-
-        for place, (i, m) in enumerate(zip(self.order, before.moved, strict=True)):
+        moved = before.motion.entries()  # x_i - x^-
+        for place, (i, m) in enumerate(zip(self.order, list(moved), strict=True)):
             if is_zero(m):
                 continue
             period = model.periods[i]

@@ -22,10 +22,10 @@ from kfgen.model.options import Points
 class PointSet:
     """Points of L dimensions other than the centre.
 
-    rows: their coefficients of the root's columns (count, L). wm, wc: their weights, one for all or one each.
-    centre: whether the set has a point at the mean. wc0: its weight in covariances.
-    theta, extra: see above. exact: whether second moments of the points are those of the covariance, and their
-    mean is 0, so that a linear function needs no points.
+    rows: their coefficients of the root's columns (count, L). wm, wc: their weights, one for all or one each. centre:
+    whether the set has a point at the mean. wc0: its weight in covariances. theta, extra: see above. exact: whether
+    second moments of the points are those of the covariance, and their mean is 0, so that a linear function needs no
+    points. symmetric: the points are pairs, +- along one column of the root each.
     """
 
     rows: list[list[Fraction]]
@@ -36,6 +36,7 @@ class PointSet:
     theta: int
     extra: Fraction
     exact: bool
+    symmetric: bool
 
     @property
     def uniform(self) -> bool:
@@ -67,7 +68,7 @@ def point_set(options: Points, L: int) -> PointSet:
     count = 2 * L
     shifted = wc0 + count * wc - 2 * wc / wm
     theta, extra = (0, shifted) if shifted >= 0 else (1, wc0)
-    return PointSet(rows, [wm] * count, [wc] * count, options.kind != "cubature", wc0, theta, extra, True)
+    return PointSet(rows, [wm] * count, [wc] * count, options.kind != "cubature", wc0, theta, extra, True, True)
 
 
 def _weights(options: Points, L: int) -> tuple[Fraction, Fraction, Fraction, Fraction]:
@@ -101,5 +102,5 @@ def _custom(options: Points) -> PointSet:
     extra = Fraction(0) if centre is None else wc[centre]
     return PointSet(
         [list(rows[k]) for k in others], [wm[k] for k in others], [wc[k] for k in others],
-        centre is not None, extra, 1, extra, exact,
+        centre is not None, extra, 1, extra, exact, False,
     )  # fmt: skip

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import Any
 
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.factors import solved, udu
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.covariance.base import Covariance
-from kfgen.filters.covariance.gather import noise_root
+from kfgen.filters.covariance.base import Solving
 from kfgen.filters.covariance.noise import Given
-from kfgen.filters.covariance.ud.loops import RolledUD
 from kfgen.filters.frame import guards
 from kfgen.filters.kinds.ekf import Update
 from kfgen.filters.sigma import cloud
 from kfgen.filters.sigma.cloud import Private
+from kfgen.filters.sigma.drawing import Drawing, noise_root
 from kfgen.filters.sigma.points import PointSet
 from kfgen.filters.steps.sensor import Linearised, SensorCode, total
 from kfgen.ir.program import Argument, Function
@@ -25,9 +24,6 @@ from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
-
-if TYPE_CHECKING:
-    from kfgen.filters.sigma.ukf import Ukf
 
 
 @dataclass(frozen=True)
@@ -50,14 +46,15 @@ class Seeing:
     """
 
     def __init__(self, model: Model, sensor: SensorModel, points: PointSet, carried: tuple[str, ...],
-                 tolerance: Fraction, kept: PointSet | None = None, recalls: bool = False) -> None:  # fmt: skip
+                 drawing: Drawing, kept: PointSet | None = None, recalls: bool = False) -> None:  # fmt: skip
         self.recalls = recalls  # whether these are the points of predict
-        self.kept = None if kept is None else Seeing(model, sensor, kept, (), tolerance, recalls=True)
+        self.kept = None if kept is None else Seeing(model, sensor, kept, (), drawing, recalls=True)
         self.model = model
         self.sensor = sensor
         self.points = points
         self.carried = carried
-        self.tolerance = tolerance
+        self.drawing = drawing
+        self.tolerance = drawing.tolerance
         self.n, self.m, self.q = len(model.states), len(sensor.h), len(carried)
         self.stride = self.n + self.q
         self.symmetric = not recalls and points.balanced
@@ -175,40 +172,40 @@ class Seeing:
     def analytic(self, u: Update) -> Seen:
         """Of a linear h: P H^T and H P H^T."""
         linear = u.code.linearise(u.x)
-        dense = u.layout.entries(u.P)
+        dense = u.form.entries(u.P)
         columns = [dense.times(h) for h in linear.H]
         spread = Symmetric(self.m, lambda a, b: linalg.dot(linear.H[a], columns[b]))
         straight: Rows = [[0] * self.m for _ in range(self.n)]
         for a, column in enumerate(columns):
-            for place, value in zip(u.layout.order, column, strict=True):
+            for place, value in zip(u.form.order, column, strict=True):
                 straight[place][a] = value
         return Seen([p.value for p in linear.predicted], spread, straight, [])
 
     def draw(
-        self, ukf: Ukf, u: Update, P: Covariance, name: str = "", stored: bool = True
+        self, u: Update, P: Any, name: str = "", stored: bool = True
     ) -> tuple[Array, list[Value]]:
         """An array of points of P; conditions of failure. stored: P is that of the struct."""
         array = u.t.array(f"cloud{name}", len(self.points.rows) * self.stride)
-        return array, ukf.scatter(u.t, P, self._noise_root(u), self.points, array, stored)
+        return array, self.drawing.scatter(u.t, P, self._noise_root(u), self.points, array, stored)
 
-    def redraw(self, ukf: Ukf, u: Update, array: Array) -> list[Value]:
+    def redraw(self, u: Update, array: Array) -> list[Value]:
         """Points of the stored P, in a branch of its own; conditions of failure."""
-        return ukf.scatter(u.t, u.layout.load(u.t), self._noise_root(u), self.points, array)
+        return self.drawing.scatter(u.t, u.form.load(u.t), self._noise_root(u), self.points, array)
 
-    def look(self, ukf: Ukf, u: Update) -> tuple[Array, Array, list[Value]]:
+    def look(self, u: Update) -> tuple[Array, Array, list[Value]]:
         """Through points of x and P, or through those that the last prediction kept: what is seen, the array of
         points, conditions of failure."""
         t = u.t
         _ = u.P  # read before the branches
         seen = t.array("seen", self.size)
         if self.kept is None:
-            array, failures = self.draw(ukf, u, u.P)
+            array, failures = self.draw(u, u.P)
             self.run(u, seen, array)
             return seen, array, failures
         array = t.array("cloud", len(self.points.rows) * self.stride)
         fresh = ~t.field("kf.kept", "bool")
         with t.when(fresh):
-            guards.positive(t, self.redraw(ukf, u, array))
+            guards.positive(t, self.redraw(u, array))
             self.run(u, seen, array)
         with t.when(~fresh):
             assert self.kept.see is not None
@@ -247,10 +244,10 @@ class Seeing:
         cross = [[seen[offset + i * m + a] for a in range(m)] for i in range(self.stride)]
         return Seen(z, Symmetric(m, lambda a, b: made[a, b]), cross[: self.n], cross[self.n :])
 
-    def residual(self, ukf: Ukf, u: Update, x: list[Value], P: Covariance) -> Vector:
+    def residual(self, u: Update, x: list[Value], P: Any) -> Vector:
         """z less what points of the new x and P predict."""
         t = u.t
-        array, failures = self.draw(ukf, u, P, "_after", stored=False)
+        array, failures = self.draw(u, P, "_after", stored=False)
         guards.positive(t, failures)
         local, seen = t.array("after", self.n), t.array("seen_after", self.size)
         for i, value in enumerate(x):
@@ -258,21 +255,11 @@ class Seeing:
         self.run(u, seen, array, (local.name, 0))
         return u.code.residuals(x, self.read(t, seen).z, named=False)
 
-    def regression(self, ukf: Ukf, u: Update) -> tuple[Linearised, Symmetric]:
-        """H = Pxz^T P^-1, with R as it is; and the spread of the points (sequential filters: U D U^T)."""
-        t = u.t
-        seen = self.read(t, self.look(ukf, u)[0])
-        if isinstance(u.layout, RolledUD):
-            H = [u.layout.solved(t, f"h_{a}", [seen.cross[i][a] for i in range(self.n)], self.tolerance)
-                 for a in range(self.m)]  # fmt: skip
-            return self._regressed(u, seen, H), seen.spread
-        U, D = u.P
-        H = []
-        dense = u.layout.entries(u.P)
-        known = [dense[j, j] * self.tolerance for j in range(self.n)]  # a pivot up to it is a direction without spread
-        for a in range(self.m):
-            H.append(solved(U, D, [seen.cross[i][a] for i in range(self.n)], known))
-        return self._regressed(u, seen, H), seen.spread
+    def regression(self, u: Update, form: Solving[Any]) -> tuple[Linearised, Symmetric]:
+        """H = Pxz^T P^-1, with R as it is; and the spread of the points. form: of P, as u has it."""
+        seen = self.read(u.t, self.look(u)[0])
+        columns = [[seen.cross[i][a] for i in range(self.n)] for a in range(self.m)]
+        return self._regressed(u, seen, form.solved(u.t, u.P, columns, self.tolerance)), seen.spread
 
     def _regressed(self, u: Update, seen: Seen, H: Rows) -> Linearised:
         """With R, and what the carried noises add to it."""

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, cast
+from typing import Any
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.factors import indefinite
-from kfgen.filters.algebra.linalg import Rows, Vector, plus, times
+from kfgen.filters.algebra.linalg import Rows, Vector, times
 from kfgen.filters.algebra.numbers import (
     assume_nonnegative,
     assume_positive,
@@ -25,22 +24,16 @@ from kfgen.filters.algebra.numbers import (
     sqrt,
 )  # fmt: skip
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.covariance.base import Covariance
-from kfgen.filters.covariance.full.loops import RolledFull
+from kfgen.filters.covariance.motion import Moved
 from kfgen.filters.frame import guards
-from kfgen.filters.kinds.ekf import Update
-from kfgen.filters.sigma.gathered import definite
+from kfgen.filters.kinds.ekf import Ekf, Update
 from kfgen.filters.sigma.seeing import Seeing, Seen
 from kfgen.filters.steps.gate import chi2_threshold
 from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated
-from kfgen.filters.steps.sequence import Updated
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model.model import SensorModel
 from kfgen.quantiles import log_two_pi
-
-if TYPE_CHECKING:
-    from kfgen.filters.sigma.ukf import Ukf
 
 
 @dataclass(frozen=True)
@@ -96,19 +89,19 @@ def factored(
 
 
 def whole_vector(
-    ukf: Ukf, seeing: Seeing, t: Trace, sensor: SensorModel, used: list[Value] | None
+    ukf: Ekf, seeing: Seeing, t: Trace, sensor: SensorModel, used: list[Value] | None
 ) -> Phases:
     """The update of a sensor by the whole vector."""
-    model, layout = ukf.model, ukf.layout
+    model, form = ukf.model, ukf.form
     t.section("innovation")
     code = SensorCode(t, model, sensor, ukf.order, skipped=seeing.carried)
-    u = Update(t, sensor, code, code.prior(), layout, used, ukf.adapted_R(sensor))
+    u = Update(t, sensor, code, code.prior(), form, used, ukf.adapted_R(sensor))
     failures: list[Value] = []
     array = out = None
     if seeing.linear:
         seen = seeing.analytic(u)
     else:
-        out, array, failures = seeing.look(ukf, u)
+        out, array, failures = seeing.look(u)
         seen = seeing.read(t, out)
     linear = code.linearise(u.x)
     work = _Whole(ukf, u, seeing, linear, seen)
@@ -129,35 +122,33 @@ def whole_vector(
     prior = P
     failed: list[Value] = [] if final is first else list(final.failures)
     sure = work.sure
-    moved: Vector = [0] * ukf.n
+    motion = Moved(t, ukf.order, [0] * seeing.n)
     likelihood: Value = t.zero
     for j in range(seeing.m):
         c = [final.columns[j][place] for place in ukf.order]
-        P, bad = layout.downdated(t, P, c, final.D[j], ukf.tolerance, sure, prior)
+        P, bad = form.downdated(t, P, c, final.D[j], seeing.tolerance, sure, prior)
         if not work.definite:  # else it can only be round-off, and has been taken for zero
             failed.append(bad)
         step = final.nu[j] * final.inverse[j]
-        moved = [plus(a, times(b, step)) for a, b in zip(moved, c, strict=True)]
+        motion = motion.by(c, step)
         term = final.nu[j] * step + t.function("log", final.D[j]) + t.value(log_two_pi())
         counts = final.some[j]
         if used is not None:
             counts = used[j] if counts is None else counts & used[j]
         likelihood = likelihood + (term if counts is None else t.select(counts, term, 0))
     t.section("state")
-    x = ukf.moved(u, moved)
-    evidence = ukf.unconfined(x) + layout.evidence(P, after_predict=False)
+    x = ukf.moved(u, motion)
+    evidence = ukf.unconfined(x) + form.evidence(P, after_predict=False)
     P = ukf.limited(t, P)
     x = ukf.state.confined(t, x)
     t.section("guards")
     guards.finite(t, [nis, *x, *evidence])
-    rolled = layout.rolled and not layout.factored
-    if not layout.factored and not rolled and not work.definite:
-        failed += indefinite(P, ukf.n * ukf.scalar.epsilon)
+    if not work.definite:
+        P, indefinite = form.indefinite(P, seeing.n * ukf.scalar.epsilon)
+        failed += indefinite
     guards.positive(t, failed)
-    if rolled and not work.definite:
-        P = definite(cast(RolledFull, layout), P, ukf.n * ukf.scalar.epsilon)
     log_likelihood = likelihood * Fraction(-1, 2)
-    learnt = ukf.prepared(u, x, P, Updated(moved, P, nis, list(final.D), [], log_likelihood, []))
+    learnt = ukf.prepared(u, x, P, motion)
     yield Made(x, P, nis, log_likelihood)
     ukf.store_update(u, x, P, learnt)
 
@@ -165,7 +156,7 @@ def whole_vector(
 class _Whole:
     """The pieces of a whole-vector update that are made twice where P is inflated."""
 
-    def __init__(self, ukf: Ukf, u: Update, seeing: Seeing, linear: Linearised, seen: Seen) -> None:
+    def __init__(self, ukf: Ekf, u: Update, seeing: Seeing, linear: Linearised, seen: Seen) -> None:
         self.ukf = ukf
         self.u = u
         self.seeing = seeing
@@ -221,7 +212,7 @@ class _Whole:
 
     def inflated(
         self, seen: Seen, first: Factored, array: Array | None, out: Array | None
-    ) -> tuple[Covariance, Factored]:
+    ) -> tuple[Any, Factored]:
         """P <- (1 + a) P where the innovation fails its test, and all that follows from it."""
         t, u, seeing = self.u.t, self.u, self.seeing
         inflation = self.ukf.model.options.inflation
@@ -235,7 +226,7 @@ class _Whole:
         t.flag(fails, "ANOMALY")
         a = terms * (1 / limit - reciprocal(assume_nonnegative(first.nis))[1])
         factor = assume_positive(t.name(select(fails, 1 + a, t.one), "inflation"))
-        P = self.ukf.layout.inflated(u.P, factor)
+        P = self.ukf.form.inflated(u.P, factor)
         if array is None or out is None:
             m = seeing.m
             again = Seen(seen.z, Symmetric(m, lambda i, j: seen.spread[i, j] * factor),
@@ -244,7 +235,7 @@ class _Whole:
         root = t.name(sqrt(factor), "root_inflation")
         with t.when(fails):
             if seeing.kept is not None:
-                guards.positive(t, seeing.redraw(self.ukf, u, array))
+                guards.positive(t, seeing.redraw(u, array))
             with t.loop("k", 0, len(seeing.points.rows)) as k:
                 for i in range(seeing.n):
                     array[k * seeing.stride + i] = array[k * seeing.stride + i] * root

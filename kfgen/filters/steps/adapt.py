@@ -1,21 +1,19 @@
 """Noise covariances that are learnt from the innovations: R per sensor, Q (Mehra 1970; Akhlaghi et al. 2017).
 
-They are part of the filter's state: kept full, or as factors (U above D) where the layout is factored.
+They are part of the filter's state: kept full, or as factors (U above D) where the covariance is factored.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
 
-from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.factors import udu, udu_computed
+from kfgen.filters.algebra.factors import udu_computed
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_nonnegative, assume_positive, is_zero, select
-from kfgen.filters.algebra.rank_one import rank_one
-from kfgen.filters.algebra.symmetric import Symmetric, assembled
+from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.base import Block
+from kfgen.filters.covariance.kept import Kept
 from kfgen.filters.covariance.noise import Additive, Computed, Factored
-from kfgen.filters.frame.triangles import upper, upper_start
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
@@ -26,65 +24,6 @@ def _constants(matrix: tuple[tuple[object, ...], ...]) -> list[list[Fraction]]:
     lowering = Lowering(Trace(), {})
     values = [[lowering(e).constant for e in row] for row in matrix]
     return [[Fraction(0) if v is None else v for v in row] for row in values]
-
-
-class Kept:
-    """A covariance in a field of the struct, dense or as its factors. initial: (k, k)."""
-
-    def __init__(self, field: str, initial: list[list[Fraction]], factored: bool, doc: str) -> None:
-        self.field = field
-        self.k = len(initial)
-        self.initial = initial
-        self.factored = factored
-        self.doc = doc + (": U above D, by columns" if factored else ": upper triangle by columns")
-
-    def block(self) -> Block:
-        matrix: Rows = self.initial
-        if self.factored:
-            U, D = udu([list(row) for row in self.initial])
-            matrix = [[D[i] if i == j else U[i][j] for j in range(self.k)] for i in range(self.k)]
-        flat = tuple(Fraction(matrix[i][j]) for j in range(self.k) for i in range(j + 1))
-        return Block(self.field, len(flat), self.doc, initial=flat)
-
-    def factors(self, t: Trace) -> tuple[Rows, Vector]:
-        """U, D as they are kept. What is positive at first stays so: it is only ever multiplied and added to."""
-        U = [[self._load(t, i, j) if i < j else t.zero for j in range(self.k)] for i in range(self.k)]
-        _, D0 = udu([list(row) for row in self.initial])
-        D = [self._load(t, j, j) for j in range(self.k)]
-        for value, first in zip(D, D0, strict=True):
-            assume_positive(value) if first > 0 else assume_nonnegative(value)
-        return U, D
-
-    def entries(self, t: Trace) -> Symmetric:
-        """The dense matrix."""
-        if self.factored:
-            return assembled(*self.factors(t))
-        return Symmetric(self.k, lambda i, j: self._load(t, i, j))
-
-    def store(self, t: Trace, entries: Symmetric, factors: tuple[Rows, Vector] | None) -> None:
-        """The new matrix."""
-        for j in range(self.k):
-            for i in range(j + 1):
-                kept = entries[i, j] if factors is None else factors[1][j] if i == j else factors[0][i][j]
-                t.store(f"kf.{self.field}", upper(i, j), t.value(kept))
-
-    def get(self, t: Trace, i: Value, j: Value) -> Value:
-        """An entry for counters i <= j."""
-        def at(row: Value, col: Value) -> Value:
-            place = upper_start(col) + row
-            return t.element(f"kf.{self.field}", place)
-
-        if not self.factored:
-            return at(i, j)
-        total = t.variable("sum", at(j, j))
-        with t.when(i < j):
-            total.set(total.get() * at(i, j))
-        with t.loop("k", j + 1, self.k) as k:
-            total.set(total.get() + at(i, k) * at(k, k) * at(j, k))
-        return total.get()
-
-    def _load(self, t: Trace, i: int, j: int) -> Value:
-        return t.element(f"kf.{self.field}", upper(i, j))
 
 
 class AdaptedR:
@@ -162,22 +101,3 @@ class AdaptedQ:
         if added is not None:
             total = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(total, added, strict=True)]
         return Computed(total, self.smallest)
-
-    def next(self, t: Trace, steps: list[Vector]) -> tuple[Symmetric, tuple[Rows, Vector] | None]:
-        """Entries, and factors where they are kept, after corrections dx (n,)."""
-        b, n = self.rate, self.kept.k
-        if self.kept.factored:
-            U, D = self.kept.factors(t)
-            D = [d * (1 - b) for d in D]
-            rank_one(U, D, [([t.value(x) for x in dx], t.value(b), -1) for dx in steps], safe=True)
-            return assembled(U, D), (U, D)
-        Q = self.kept.entries(t)
-
-        def entry(i: int, j: int) -> Value:
-            total = Q[i, j] * (1 - b)
-            for dx in steps:
-                total = linalg.plus(total, linalg.times(linalg.times(dx[i], b), dx[j]))
-            value: Value = total
-            return value
-
-        return Symmetric(n, entry), None

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 from kfgen.filters.algebra.numbers import select
 from kfgen.filters.base import CONST_KF, KF, Block
-from kfgen.filters.covariance.base import Layout
+from kfgen.filters.covariance.base import Form
+from kfgen.filters.covariance.kept import Kept
 from kfgen.filters.frame.triangles import upper_start
-from kfgen.filters.steps.adapt import Kept
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
@@ -17,35 +18,35 @@ from kfgen.model import Model
 
 
 class CovarianceCode:
-    """Traces set_covariance, get_covariance and their like for a layout."""
+    """Traces set_covariance, get_covariance and their like for a form of the covariance."""
 
-    def __init__(self, model: Model, layout: Layout, epsilon: Fraction, outdated: str = "") -> None:
+    def __init__(self, model: Model, form: Form[Any], epsilon: Fraction, outdated: str = "") -> None:
         """outdated: a field that says whether something belongs to the present covariance, false when that is set."""
         self.outdated = outdated
         self.table = "order"  # the name of the table that holds the inner order
         self.model = model
-        self.layout = layout
-        self.order = layout.order
+        self.form = form
+        self.order = form.order
         self.epsilon = epsilon
-        self.n = layout.n
+        self.n = form.n
 
     def blocks(self) -> tuple[Block, ...]:
         """The fields that hold it, at P0."""
         P0 = self.model.P0
-        return tuple(self.layout.blocks([[P0[i][j] for j in self.order] for i in self.order]))
+        return tuple(self.form.blocks([[P0[i][j] for j in self.order] for i in self.order]))
 
     def functions(self, taken: frozenset[str]) -> list[Function]:
         """The covariance in and out."""
-        return [self.set_covariance(taken), self.get_covariance(taken), *self.layout.functions(taken, self.outdated)]
+        return [self.set_covariance(taken), self.get_covariance(taken), *self.form.functions(taken, self.outdated)]
 
     def constants(self) -> dict[str, tuple[int, ...]]:
-        """The inner order, where a table is needed for it, and what the layout looks up."""
+        """The inner order, where a table is needed for it, and what the form looks up."""
         straight = list(range(self.n))
         order = {} if self.order in (straight, straight[::-1]) else {self.table: tuple(self.order)}
-        return {**order, **self.layout.tables}
+        return {**order, **self.form.tables}
 
     def place(self, t: Trace) -> Callable[[Value], Value]:
-        """From an inner position to the state of the spec."""
+        """From an inner position, a loop's counter, to the state of the spec."""
         if self.order == list(range(self.n)):
             return lambda i: i
         if self.order == list(reversed(range(self.n))):
@@ -55,7 +56,7 @@ class CovarianceCode:
     def get_covariance(self, taken: frozenset[str]) -> Function:
         """P, row-major, in the spec's order."""
         doc = "The covariance of the state, in the order of the states."
-        return get_matrix("covariance", "P", self.n, self.layout.get, self.place, doc, taken)
+        return get_matrix("covariance", "P", self.n, self.form.get, self.place, doc, taken)
 
     def get_noise(self, kept: Kept, taken: frozenset[str]) -> Function:
         """The adapted Q, row-major, in the spec's order."""
@@ -67,7 +68,7 @@ class CovarianceCode:
         t = Trace()
         P, W = self.read(t)
         t.section("store")
-        self.layout.put(t, P, W)
+        self.form.put(t, P, W)
         if self.outdated:
             t.store(self.outdated, None, t.wrapped(t.pool.boolean(False)))
         return Function(

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import Any
 
 from kfgen.filters.base import DT, INPUTS, KF, MASK, sensor_argument
-from kfgen.filters.covariance.base import Covariance
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
 from kfgen.filters.steps.process import Step
@@ -30,11 +30,11 @@ class Judged:
 
 @dataclass(frozen=True)
 class Made:
-    """The estimate that will be stored: x (n,) in the spec's order, P; of an update also the plain nis and the
-    log-likelihood."""
+    """The estimate that will be stored: x (n,) in the spec's order, P as its form holds it; of an update also the
+    plain nis and the log-likelihood."""
 
     x: list[Value]
-    P: Covariance
+    P: Any
     nis: Value | None = None
     log_likelihood: Value | None = None
 

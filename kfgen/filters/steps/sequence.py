@@ -6,17 +6,16 @@ whole vector. Robust and adaptive updates, floors of the innovation variance and
 
 from __future__ import annotations
 
-from copy import copy
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Generic
 
-from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Vector
+from kfgen.filters.algebra.linalg import Vector, plus, times
 from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import assume_positive, is_positive, is_zero, reciprocal, select
-from kfgen.filters.covariance.base import Covariance, Layout
-from kfgen.filters.covariance.looped import Displacement, displaced
+from kfgen.filters.covariance.base import Form, P
+from kfgen.filters.covariance.parts import Motion, Scalar
 from kfgen.filters.steps.influence import weigh
 from kfgen.filters.steps.sensor import Innovation
 from kfgen.ir.trace import Trace, Value
@@ -25,20 +24,17 @@ from kfgen.quantiles import chi2_quantile, log_two_pi
 
 
 @dataclass(frozen=True)
-class Updated:
-    """After all components, in the filter's inner order.
-
-    moved: x - prior (n,). steps: K_i nu_i of each scalar. s: innovation variances. failures: conditions under
+class Updated(Generic[P]):
+    """After all components. motion: by what the state has moved. s: innovation variances. failures: conditions under
     which an innovation variance is negative beyond round-off.
     """
 
-    moved: Vector
-    P: Covariance
+    motion: Motion
+    P: P
     nis: Value
     s: list[Value]
     failures: list[Value]
     log_likelihood: Value
-    steps: list[Vector]
 
 
 def departs(model: Model) -> bool:
@@ -48,22 +44,19 @@ def departs(model: Model) -> bool:
     return changed or options.influence is not None or options.inflation is not None
 
 
-class Sequence:
-    """Updates of a layout by the components of a sensor.
+class Sequence(Generic[P]):
+    """Updates of a covariance by the components of a sensor.
 
     plain: the textbook's, without robust, adaptive and changed gains.
     """
 
     def __init__(
-        self, t: Trace, model: Model, layout: Layout, names: list[str], plain: bool, epsilon: Fraction
+        self, t: Trace, model: Model, form: Form[P], names: list[str], plain: bool, epsilon: Fraction
     ) -> None:
         self.t = t
         self.epsilon = epsilon
         self.model = model
-        self.layout = layout
-        if plain and layout.change is not None:
-            self.layout = copy(layout)
-            self.layout.change = None
+        self.form = form.plain() if plain else form
         self.names = names
         self.plain = plain
         options = model.options
@@ -75,80 +68,79 @@ class Sequence:
         if self.inflation is not None:
             self.threshold = self.inflation.threshold or chi2_quantile(self.inflation.probability, 1)
 
-    def run(self, P: Covariance, innovation: Innovation) -> Updated:
+    def run(self, P: P, innovation: Innovation) -> Updated[P]:
         """All components in order; P stays as it is."""
-        t, layout = self.t, self.layout
-        rows, variances, y = innovation.rows, innovation.variances, innovation.y
-        moved: Vector = [0] * layout.n
+        t, form = self.t, self.form
+        rows, variances = innovation.rows, innovation.variances
+        motion = form.at_rest(t, P)
         nis: Any = 0
         likelihood: Any = 0  # -2 log
         every_s: list[Value] = []
         failures: list[Value] = []
-        steps: list[Vector] = []
         prior = P  # what rounding leaves is relative to what it was
         exact = [not is_positive(r) and _several(h) for h, r in zip(rows, variances, strict=True)]
         singly = self.singly or any(exact)
-        group = 1 if singly else layout.group
+        group = 1 if singly else form.group
         for first in range(0, len(rows), group):
             part = range(first, min(first + group, len(rows)))
             titles = ", ".join(self.names[c] for c in part)
             t.section("gain and covariance" + (f": {titles}" if len(rows) > 1 else ""))
-            below = [0 if is_positive(variances[c]) else layout.tolerance(prior, rows[c]) for c in part]
-            measurements = [Measurement(rows[c], variances[c]) for c in part]
-            nu: Any = None
+            below = [0 if is_positive(variances[c]) else form.tolerance(prior, rows[c]) for c in part]
             if singly:
-                nu = self._corrected(y, rows, moved, first)
-                if exact[first]:
-                    measurements = [self._unless_known(P, prior, measurements[0])]
-                used = None if innovation.used is None else innovation.used[first]
-                P, nu, measurement, failed = self._prepared(P, first, nu, measurements[0], used, below[0])
-                measurements = [measurement]
+                P, scalar, failed = self._single(P, prior, innovation, first, motion, exact[first], below[0])
+                scalars = [scalar]
                 failures += failed
-            elif layout.rolled:
-                nu = self._corrected(y, rows, moved, first)
-            if layout.rolled:
-                measurements = [replace(measurements[0], nu=nu, moved=moved)]
-            P, gains, s = layout.update(t, P, measurements)
-            for c, K, variance, low in zip(part, gains, s, below, strict=True):
-                t.name(variance, f"s_{self.names[c]}")
-                if not (singly or layout.rolled):
-                    nu = self._corrected(y, rows, moved, c)
-                step = [linalg.times(k, nu) for k in K]
-                steps.append(step)
-                moved = displaced(moved, K, nu)
-                square = K.square if isinstance(K, Displacement) else None
-                if square is None:
-                    square = nu * (nu * (1 / variance))  # the gain has made the reciprocal
+            else:
+                scalars = [Scalar(Measurement(rows[c], variances[c]), self._innovation(innovation, c)) for c in part]
+            P, gains = form.update(t, P, scalars, motion)
+            for c, gain, low in zip(part, gains, below, strict=True):
+                variance = t.name(gain.s, f"s_{self.names[c]}")
+                motion, square = gain.applied(motion)
                 sure = is_positive(variances[c]) or self.floor is not None
-                if sure and not (layout.rolled and layout.factored):  # there it is r and squares
-                    failures.append(~(variance > 0))
-                elif sure:
-                    pass
-                else:  # a direction already known, measured exactly: skipped
+                if not sure:  # a direction already known, measured exactly: skipped
                     square = t.select(variance > 0, square, 0)
                     failures.append(variance < -low)
-                nis = linalg.plus(nis, square)
+                elif not gain.sound:
+                    failures.append(~(variance > 0))
+                nis = plus(nis, square)
                 if self.model.spec.code.log_likelihood:
                     term = square + t.function("log", variance) + t.value(log_two_pi())
                     term = term if sure else t.select(variance > 0, term, 0)
                     if innovation.used is not None:
                         term = t.select(innovation.used[c], term, 0)
-                    likelihood = linalg.plus(likelihood, term)
-                every_s.append(t.value(variance))
+                    likelihood = plus(likelihood, term)
+                every_s.append(variance)
         if self.plain:
             t.section("state and innovation squared")
             nis = t.name(nis, "nis")
-        return Updated(moved, P, nis, every_s, failures, t.value(likelihood) * Fraction(-1, 2), steps)
+        return Updated(motion, P, nis, every_s, failures, t.value(likelihood) * Fraction(-1, 2))
 
-    def _corrected(self, y: Vector, rows: list[Vector], moved: Vector, c: int) -> Value:
+    def _innovation(self, innovation: Innovation, c: int) -> Callable[[Motion], Value]:
         """y_c less what the components before it have moved."""
-        correction = linalg.dot(rows[c], moved)
-        nu: Value = y[c] if is_zero(correction) else self.t.name(y[c] - correction, f"nu_{self.names[c]}")
-        return nu
+
+        def corrected(motion: Motion) -> Value:
+            y = innovation.y[c]
+            correction = motion.along(innovation.rows[c])
+            nu: Value = y if is_zero(correction) else self.t.name(y - correction, f"nu_{self.names[c]}")
+            return nu
+
+        return corrected
+
+    def _single(
+        self, P: P, prior: P, innovation: Innovation, c: int, motion: Motion, exact: bool, below: Value | int
+    ) -> tuple[P, Scalar, list[Value]]:
+        """P, the measurement of a component by itself, and conditions of failure. exact: it may say what is known."""
+        nu = self._innovation(innovation, c)(motion)
+        measurement = Measurement(innovation.rows[c], innovation.variances[c])
+        if exact:
+            measurement = self._unless_known(P, prior, measurement)
+        used = None if innovation.used is None else innovation.used[c]
+        P, nu, measurement, failed = self._prepared(P, c, nu, measurement, used, below)
+        return P, Scalar(measurement, lambda _: nu), failed
 
     def _prepared(
-        self, P: Covariance, c: int, nu: Value, measurement: Measurement, used: Value | None, below: Value | int
-    ) -> tuple[Covariance, Value, Measurement, list[Value]]:
+        self, P: P, c: int, nu: Value, measurement: Measurement, used: Value | None, below: Value | int
+    ) -> tuple[P, Value, Measurement, list[Value]]:
         """Robust, then adaptive, then the floor: P, the innovation, the measurement, conditions of failure."""
         t, floor = self.t, self.floor
         h, r, name = measurement.h, measurement.r, self.names[c]
@@ -157,16 +149,16 @@ class Sequence:
             nu, g = weigh(t, self.model, self.influence, name, nu, r, used)
         if self.threshold is None and floor is None:
             return P, nu, Measurement(h, r, g), []
-        spread = t.value(linalg.times(g, self.layout.variance(P, h)))
+        spread = t.value(times(g, self.form.variance(P, h)))
         failed: list[Value] = []
         if self.threshold is not None:
-            wanted = linalg.times(g, nu * nu) * (1 / self.threshold)  # the s that would just pass the test
+            wanted = times(g, nu * nu) * (1 / self.threshold)  # the s that would just pass the test
             some, inverse = reciprocal(spread)
             excess = t.name(wanted - (spread + r), f"excess_{name}")
             inflate = t.name((excess > 0) & some & self._uncertain(P, h, spread), f"inflate_{name}")
             t.flag(inflate, "ANOMALY")
             a = assume_positive(t.name(select(inflate, 1 + excess * inverse, t.one), f"inflation_{name}"))
-            P = self.layout.inflated(P, a)
+            P = self.form.inflated(P, a)
             spread = spread * a
         if floor is not None:
             low = spread + r < floor
@@ -179,20 +171,20 @@ class Sequence:
             r = assume_positive(select(low, floor - spread, r))
         return P, nu, Measurement(h, r, g), failed
 
-    def _uncertain(self, P: Covariance, h: Vector, spread: Value) -> Value:
+    def _uncertain(self, P: P, h: Vector, spread: Value) -> Value:
         """Whether h P h^T is more than what rounding leaves of a direction that is known exactly."""
         if not _several(h):
             return self.t.wrapped(self.t.pool.boolean(True))
-        dense = self.layout.entries(P)
+        dense = self.form.entries(P)
         terms = [x * x * dense[i, i] for i, x in enumerate(h) if not is_zero(x)]
-        uncertain: Value = spread > sum(terms[1:], terms[0]) * (8 * self.layout.n * self.epsilon)
+        uncertain: Value = spread > sum(terms[1:], terms[0]) * (8 * self.form.n * self.epsilon)
         return uncertain
 
-    def _unless_known(self, P: Covariance, prior: Covariance, measurement: Measurement) -> Measurement:
+    def _unless_known(self, P: P, prior: P, measurement: Measurement) -> Measurement:
         """The measurement, with h = 0 where it says exactly what is known exactly already: it is then skipped."""
         h, t = measurement.h, self.t
-        spread = t.value(self.layout.variance(P, h))
-        lowest = -t.value(self.layout.tolerance(prior, h))
+        spread = t.value(self.form.variance(P, h))
+        lowest = -t.value(self.form.tolerance(prior, h))
         known = ~self._uncertain(prior, h, spread) & (t.value(measurement.r) <= 0) & ~(spread < lowest)
         return Measurement([x if is_zero(x) else select(known, 0, x) for x in h], measurement.r)
 

@@ -1,39 +1,34 @@
-"""Covariance kept as the upper triangle of P, column by column."""
+"""The upper triangle of P in straight-line code."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from fractions import Fraction
 
-from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.factors import cholesky, factor_columns, udu_computed
-from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.factors import cholesky, factor_columns, indefinite, udu_computed
+from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, quotients, times
 from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, is_positive, is_zero, select, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
-from kfgen.filters.base import Block
-from kfgen.filters.covariance.base import Covariance, GainChange
+from kfgen.filters.covariance.full.store import FullStore
+from kfgen.filters.covariance.gather import GatheredEntries
+from kfgen.filters.covariance.loops.partly import EntriesInLoops
+from kfgen.filters.covariance.motion import VectorGain
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.frame.triangles import upper, upper_start
-from kfgen.ir.program import Function
+from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Scalar
+from kfgen.filters.covariance.straight import StraightLine
+from kfgen.filters.frame.triangles import upper
 from kfgen.ir.trace import Array, Trace, Value
 
 
-class Full:
-    """Layout `full`, with the updates `joseph` and `standard`. A covariance is its rows; only i <= j is used."""
+class StraightFull(StraightLine, FullStore):
+    """The updates `joseph` and `standard`. Of a covariance only i <= j is used."""
 
-    title = "full"
-    reorders = False
-    rolled = False
-    tables: Mapping[str, tuple[int, ...]] = {}
-    factored = False
     group = 1
 
     def __init__(
         self, n: int, update: str, epsilon: Fraction, sequence: list[int], change: GainChange | None = None
     ) -> None:
-        self.n = n
-        self.order = list(range(n))
+        super().__init__(n)
         self.form = update
         self.change = change
         self.epsilon = epsilon
@@ -41,9 +36,8 @@ class Full:
         # couples: few entries of the old P are then still needed when they are overwritten.
         self.sequence = sequence
 
-    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
-        flat = tuple(P0[i][j] for j in range(self.n) for i in range(j + 1))
-        return [Block("P", len(flat), "covariance, upper triangle column by column", initial=flat)]
+    def plain(self) -> StraightFull:
+        return self if self.change is None else StraightFull(self.n, self.form, self.epsilon, self.sequence)
 
     def load(self, t: Trace) -> Symmetric:
         return Symmetric(self.n, lambda i, j: t.element("kf.P", upper(i, j)))
@@ -63,14 +57,16 @@ class Full:
 
         return P.congruent(F).changed(with_noise)
 
-    def update(self, t: Trace, P: Symmetric, measurements: list[Measurement]) -> tuple[Symmetric, Rows, Vector]:
-        """Scalar measurements one after another: P, the gains (m, n) and the innovation variances (m,)."""
-        gains, s = [], []
-        for measurement in measurements:
+    def update(
+        self, t: Trace, P: Symmetric, measurements: list[Scalar], motion: Motion
+    ) -> tuple[Symmetric, list[VectorGain]]:
+        gains = []
+        for scalar in measurements:
+            measurement = scalar.measurement
             h, r = measurement.h, measurement.r
             c = P.times(h)
-            variance = linalg.times(measurement.g, linalg.dot(h, c)) + r
-            K = linalg.quotients(c, variance, r)
+            variance = times(measurement.g, dot(h, c)) + r
+            K = quotients(c, variance, r)
             if self.change is not None:
                 K = self.change(K)
             if self.form == "joseph":
@@ -79,15 +75,14 @@ class Full:
                 P = P.downdated(measurement, c, K)
             if not is_positive(r):
                 P = self._clamped(t, P, measurement, K, c)
-            gains.append(K)
-            s.append(variance)
-        return P, gains, s
+            gains.append(VectorGain(K, variance, scalar.innovation))
+        return P, gains
 
     def entries(self, P: Symmetric) -> Symmetric:
         return P
 
     def variance(self, P: Symmetric, h: Vector) -> Number:
-        return linalg.dot(h, P.times(h))
+        return dot(h, P.times(h))
 
     def inflated(self, P: Symmetric, a: Number) -> Symmetric:
         return P.changed(lambda i, j, p: p * a)
@@ -97,15 +92,13 @@ class Full:
         low = {}
         for i in range(self.n):
             if not is_zero(K[i]):
-                old = P[i, i] + linalg.times(measurement.g, K[i]) * c[i]
+                old = P[i, i] + times(measurement.g, K[i]) * c[i]
                 low[i] = (P[i, i] < 0) & (P[i, i] >= -(old * (4 * self.n * self.epsilon)))
                 t.flag(low[i], "REGULARIZED")
         return P.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p)
 
     def tolerance(self, P: Symmetric, h: Vector) -> Value | int:
-        """How far below zero h P h^T may come out by round-off."""
-        terms = [(hi * hi * P[i, i]) for i, hi in enumerate(h) if not is_zero(hi)]
-        return sum(terms[1:], terms[0]) * (4 * self.n * self.epsilon) if terms else 0
+        return round_off(P, h, self.epsilon)
 
     def limit(self, t: Trace, P: Symmetric, floors: list[Fraction | None], ceilings: list[Fraction | None]
               ) -> Symmetric:  # fmt: skip
@@ -147,6 +140,9 @@ class Full:
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
         return assembled(U, D)
 
+    def from_entries(self, P: Symmetric) -> Symmetric:
+        return P
+
     def factors(self, P: Symmetric) -> tuple[Rows, Vector]:
         dense = [[P[min(i, j), max(i, j)] for j in range(self.n)] for i in range(self.n)]
         return udu_computed(dense, self.n * self.epsilon)
@@ -154,16 +150,23 @@ class Full:
     def columns(self, P: Symmetric) -> list[tuple[Vector, Number]]:
         return factor_columns(*self.factors(P))
 
-    def root(self, P: Symmetric, tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
+    def root(self, t: Trace, P: Symmetric, tolerance: Fraction, stored: bool, in_loops: bool) -> Array | Columns:
+        if stored and in_loops:
+            return self.root_array(t, tolerance)
         S, failures = cholesky(lambda i, j: P[i, j], self.n, tolerance)
-        return [[S[i][j] for i in range(self.n)] for j in range(self.n)], failures
+        return Columns([[S[i][j] for i in range(self.n)] for j in range(self.n)], failures)
+
+    def gatherer(
+        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
+    ) -> Gatherer[Symmetric]:
+        return EntriesInLoops(t, Q, noise, how) if how.in_loops else GatheredEntries(t, Q, noise, how)
 
     def downdated(
-        self, t: Trace, P: Symmetric, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Covariance
+        self, t: Trace, P: Symmetric, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Symmetric
     ) -> tuple[Symmetric, Value]:
         inverse = 1 / s
-        K = [linalg.times(x, inverse) for x in c]
-        after = P.changed(lambda i, j, p: linalg.minus(p, linalg.times(K[i], c[j])))
+        K = [times(x, inverse) for x in c]
+        after = P.changed(lambda i, j, p: minus(p, times(K[i], c[j])))
         if sure:
             return after, t.wrapped(t.pool.boolean(False))
         low = {i: after[i, i] < 0 for i in range(self.n) if not is_zero(c[i])}
@@ -173,16 +176,11 @@ class Full:
             t.flag(negative, "REGULARIZED")
         return after.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p), failed
 
-    def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
-        return []
+    def indefinite(self, P: Symmetric, tolerance: Fraction) -> tuple[Symmetric, list[Value]]:
+        return P, indefinite(P, tolerance)
 
-    # covariance in and out, as loops -------------------------------------------------------------------
 
-    def get(self, t: Trace, i: Value, j: Value) -> Value:
-        """P_ij for counters i <= j."""
-        return t.element("kf.P", upper_start(j) + i)
-
-    def put(self, t: Trace, P: Array, factors: Array) -> None:
-        """Store a covariance (upper triangle column by column) whose factors are known to be positive."""
-        with t.loop("k", 0, self.n * (self.n + 1) // 2) as k:
-            t.store("kf.P", k, P[k])
+def round_off(P: Symmetric, h: Vector, epsilon: Fraction) -> Value | int:
+    """How far below zero h P h^T may come out by round-off."""
+    terms = [(hi * hi * P[i, i]) for i, hi in enumerate(h) if not is_zero(hi)]
+    return sum(terms[1:], terms[0]) * (4 * P.n * epsilon) if terms else 0

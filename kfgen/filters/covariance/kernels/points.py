@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from kfgen.filters.algebra.numbers import select, sqrt
-from kfgen.filters.covariance.kernels.updates import Given
-from kfgen.filters.covariance.looped import Kernels, array_argument, number_argument
+from kfgen.filters.covariance.kernels.function import Given, Kernels, array_argument, number_argument
 from kfgen.filters.frame.triangles import strict_start, upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Trace, Value
@@ -33,7 +32,7 @@ def _factors(n: int, constant: bool) -> list[tuple[str, int, bool]]:
 
 
 def remove(kernels: Kernels, n: int, sure: bool) -> Function:
-    """U D U^T -= c c^T / s (see `algebra.measurement.downdate`). sure: no direction without spread is to be left alone."""
+    """U D U^T -= c c^T / s (see `measurement.downdate`). sure: no direction without spread is to be left alone."""
 
     def body(t: Trace) -> None:
         U, D, c = (Given(t, name) for name in ("factor", "diagonal", "c"))

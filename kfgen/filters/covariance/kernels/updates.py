@@ -1,9 +1,10 @@
-"""The inner loops of rolled filters, as private functions of the emitted file."""
+"""Scalar measurements and columns absorbed, in loops over factors."""
 
 from __future__ import annotations
 
 from kfgen.filters.algebra.numbers import select, sqrt
-from kfgen.filters.covariance.looped import (
+from kfgen.filters.covariance.kernels.function import (
+    Given,
     Kernels,
     array_argument,
     counter,
@@ -11,23 +12,9 @@ from kfgen.filters.covariance.looped import (
     number_argument,
     select_counter,
 )
-from kfgen.filters.frame.triangles import strict_start, upper_start
+from kfgen.filters.frame.triangles import strict_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value, Variable
-
-
-class Given:
-    """An array that a private function is given. What is read stands for its value before any store."""
-
-    def __init__(self, t: Trace, name: str) -> None:
-        self.t = t
-        self.name = name
-
-    def __getitem__(self, i: int | Value) -> Value:
-        return self.t.element(self.name, i)
-
-    def __setitem__(self, i: int | Value, value: Value | int) -> None:
-        self.t.store(self.name, i, self.t.value(value))
 
 
 def absorb(kernels: Kernels, n: int, sure: bool) -> Function:
@@ -74,6 +61,32 @@ def absorb(kernels: Kernels, n: int, sure: bool) -> Function:
                  number_argument("weight_a"), number_argument("weight_b"), counter_argument("count")]  # fmt: skip
     doc = "U D U^T += weight_a a a^T + weight_b b b^T; w holds a and b, zero from `count` on, and is zeroed"
     return kernels.function("absorb_pair" if sure else "absorb_any_pair", arguments, doc, body)
+
+
+def absorb_one(kernels: Kernels, n: int) -> Function:
+    """U D U^T += weight w w^T, as `algebra.rank_one`."""
+
+    def body(t: Trace) -> None:
+        U, D, w = (Given(t, name) for name in ("factor", "diagonal", "w"))
+        weight = t.variable("left", t.field("weight"))
+        with t.loop("j", 0, n, down=True) as j:
+            s, d = t.name(w[j], "s"), t.name(D[j], "d")
+            v = t.name(weight.get() * s, "v")
+            a = t.name(d + s * v, "a")
+            some = t.name(a > t.smallest, "some")
+            b = t.name(select(some, v / a, 0), "b")
+            ratio = t.name(select(some, d / a, 1), "ratio")
+            D[j] = a
+            with t.loop("i", 0, j) as i:
+                place = strict_start(j) + i
+                u, w_i = t.name(U[place], "u"), t.name(w[i], "w_i")
+                w[i] = w_i - s * u
+                U[place] = ratio * u + b * w_i
+            weight.set(weight.get() * ratio)
+
+    arguments = [array_argument("factor", n * (n - 1) // 2), array_argument("diagonal", n), array_argument("w", n)]
+    arguments.append(number_argument("weight"))
+    return kernels.function("absorb", arguments, "U D U^T += weight w w^T; w is used up", body)
 
 
 def bierman(kernels: Kernels, n: int, single: bool, sure: bool, weighted: bool, moves: bool) -> Function:
@@ -211,49 +224,3 @@ def carlson(kernels: Kernels, n: int, sure: bool, weighted: bool, moves: bool) -
     doc = "Carlson's update by a measurement of h x, of variance r; h is zero before `first` and after `last`"
     doc += ". s: its innovation variance" + (", and nu^2 over it; moved += gain nu" if moves else "")
     return kernels.function("measure_root" + "_gain" * (not moves) + "_any" * (not sure), arguments, doc, body)
-
-
-def take_row(kernels: Kernels, n: int) -> Function:
-    """Row i of a packed upper triangle, whole."""
-
-    def body(t: Trace) -> None:
-        P, row = Given(t, "P"), Given(t, "row")
-        i = counter(t, "i")
-        with t.loop("j", 0, i + 1) as j:
-            row[j] = P[upper_start(i) + j]
-        with t.loop("j", i + 1, n) as j:
-            row[j] = P[upper_start(j) + i]
-
-    arguments = [array_argument("P", n * (n + 1) // 2, constant=True), counter_argument("i"), array_argument("row", n)]
-    return kernels.function("take_row", arguments, "Row i of a symmetric matrix", body)
-
-
-def put_row(kernels: Kernels, n: int) -> Function:
-    """Replace row and column i of a packed upper triangle by a multiple of a vector."""
-
-    def body(t: Trace) -> None:
-        P, row, factor = Given(t, "P"), Given(t, "row"), t.field("factor")
-        i = counter(t, "i")
-        with t.loop("j", 0, i + 1) as j:
-            P[upper_start(i) + j] = row[j] * factor
-        with t.loop("j", i + 1, n) as j:
-            P[upper_start(j) + i] = row[j] * factor
-
-    arguments = [array_argument("P", n * (n + 1) // 2), counter_argument("i")]
-    arguments += [array_argument("row", n, constant=True), number_argument("factor")]
-    return kernels.function("put_row", arguments, "Replace row and column i of a symmetric matrix by factor row", body)
-
-
-def add_terms(kernels: Kernels, n: int) -> Function:
-    """Joseph's form in the end: P - gain c^T + rest gain^T, the upper triangle."""
-
-    def body(t: Trace) -> None:
-        P, c, gain, rest = (Given(t, name) for name in ("P", "c", "gain", "rest"))
-        with t.loop("j", 0, n) as j:
-            c_j, gain_j = t.name(c[j], "c_j"), t.name(gain[j], "gain_j")
-            with t.loop("i", 0, j + 1) as i:
-                P[upper_start(j) + i] = P[upper_start(j) + i] - gain[i] * c_j + rest[i] * gain_j
-
-    arguments = [array_argument("P", n * (n + 1) // 2)]
-    arguments += [array_argument(name, n, constant=True) for name in ("c", "gain", "rest")]
-    return kernels.function("joseph", arguments, "P <- P - gain c^T + rest gain^T", body)

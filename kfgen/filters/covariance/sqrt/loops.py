@@ -1,87 +1,59 @@
-"""Covariance kept as its lower Cholesky factor, in loops: layout `sqrt` for size, the same field, the same numbers."""
+"""The lower Cholesky factor in loops: for size; the same field and the same numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
-from kfgen.filters.algebra.linalg import Rows, Vector
-from kfgen.filters.algebra.measurement import Measurement
-from kfgen.filters.algebra.numbers import Number, assume_nonnegative, constant_root, is_positive, select, sqrt
+from kfgen.filters.algebra.linalg import Rows, Vector, times
+from kfgen.filters.algebra.numbers import (
+    Number,
+    assume_nonnegative,
+    constant_root,
+    is_positive,
+    is_zero,
+    reciprocal,
+    select,
+    sqrt,
+)  # fmt: skip
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.covariance.kernels.absorber import Absorber
+from kfgen.filters.covariance.kernels.function import Passed, integer
 from kfgen.filters.covariance.kernels.points import remove_root
 from kfgen.filters.covariance.kernels.updates import carlson
-from kfgen.filters.covariance.looped import (
-    Column,
-    Displacement,
-    Given,
-    Kernels,
-    Space,
-    at_rest,
-    fill,
-    integer,
-    next_gain,
-)
+from kfgen.filters.covariance.loops.absorber import Absorber
+from kfgen.filters.covariance.loops.gather import LoopedFactors
+from kfgen.filters.covariance.loops.looped import Looped, Looping
+from kfgen.filters.covariance.loops.motion import AppliedGain, ArrayGain, Displacement, array_of_gain, start_moved
+from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.sqrt.straight import Sqrt
+from kfgen.filters.covariance.parts import Gathering, Part, Scalar
+from kfgen.filters.covariance.sqrt.root import ArrayRoot
+from kfgen.filters.covariance.sqrt.store import SqrtStore
+from kfgen.filters.covariance.sqrt.straight import StraightSqrt
 from kfgen.filters.frame.runs import Put
-from kfgen.filters.frame.triangles import strict, strict_start
+from kfgen.filters.frame.triangles import strict_start
 from kfgen.ir.trace import Array, Trace, Value
 
 
-@dataclass(frozen=True)
-class Root:
-    """S, upper triangular in the inner order: that of the struct, or in the function's own arrays, of which only the
-    last version counts: `factor` above the diagonal, `diagonal`."""
+class LoopedSqrt(Looped, SqrtStore):
+    """The same steps as the straight sibling's."""
 
-    space: Space
-    own: bool
-
-
-class RolledSqrt(Sqrt):
-    """Layout `sqrt` in loops."""
-
-    rolled = True
-
-    def __init__(
-        self, n: int, names: list[str], kernels: Kernels, weighted: bool, steps: bool, table: tuple[str, str]
-    ) -> None:
-        """As of RolledUD."""
-        super().__init__(n)
-        self.names = names
-        self.kernels = kernels
-        self.weighted = weighted
-        self.steps = steps
-        self.absorber = Absorber(names, kernels, table)
+    def __init__(self, sibling: StraightSqrt, how: Looping) -> None:
+        Looped.__init__(self, sibling, how)
+        SqrtStore.__init__(self, sibling.n)
+        self.absorber = Absorber(how.names, how.kernels, how.table)
 
     @property
-    def tables(self) -> Mapping[str, tuple[int, ...]]:  # type: ignore[override]
+    def tables(self) -> Mapping[str, tuple[int, ...]]:
         return self.absorber.tables
 
-    def load(self, t: Trace) -> Root:  # type: ignore[override]
-        return Root(Space(t), own=False)
+    def plain(self) -> LoopedSqrt:
+        return self
 
-    def _at(self, P: Root, i: int | Value, j: int | Value) -> Value:
-        """S_ij, i < j."""
-        t = P.space.t
-        if P.own:
-            return P.space.arrays["factor"][(strict_start(j) if isinstance(j, Value) else strict(0, j)) + i]
-        return t.element("kf.S", self.spot(t, i, j))
+    def load(self, t: Trace) -> ArrayRoot:
+        return ArrayRoot(Space(t), self, own=False)
 
-    def _diagonal(self, P: Root, j: int | Value) -> Value:
-        """S_jj."""
-        t = P.space.t
-        return P.space.arrays["diagonal"][j] if P.own else t.element("kf.S", self.spot(t, j, j))
-
-    def spot(self, t: Trace, i: int | Value, j: int | Value) -> int | Value:
-        """Where S_ij stands in kf.S, i <= j."""
-        if isinstance(i, int) and isinstance(j, int):
-            return self.packed(i, j)
-        return self._place(integer(t, i) if isinstance(i, int) else i, integer(t, j) if isinstance(j, int) else j)
-
-    def _owned(self, P: Root) -> Root:
+    def _owned(self, P: ArrayRoot) -> ArrayRoot:
         """S in arrays that may be changed."""
         if P.own:
             return P
@@ -89,30 +61,30 @@ class RolledSqrt(Sqrt):
         U, D = self.absorber.arrays(P.space)
         with t.loop("j", 0, self.n) as j:
             with t.loop("i", 0, j) as i:
-                U[strict_start(j) + i] = self._at(P, i, j)
-            D[j] = self._diagonal(P, j)
-        return Root(P.space, own=True)
+                U[strict_start(j) + i] = P.at(i, j)
+            D[j] = P.diagonal(j)
+        return ArrayRoot(P.space, self, own=True)
 
-    def predict(self, t: Trace, P: Root, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]  # type: ignore[override]
-                ) -> Root:  # fmt: skip
+    def predict(self, t: Trace, P: ArrayRoot, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]
+                ) -> ArrayRoot:  # fmt: skip
         """S S^T <- F S S^T F^T + Q + sum of d w w^T: U D U^T first, one root per state at the end."""
 
         def weight(k: int | Value) -> Value:
             if k == 0 and isinstance(k, int):  # its column is taken as a unit vector
-                first = self._diagonal(P, 0)
+                first = P.diagonal(0)
                 return first * first
             return t.one
 
         def column_of(k: Value, entry: Put) -> None:
             with t.loop("i", 0, k + 1) as i:
-                entry(i, self._at(P, i, k))
+                entry(i, P.at(i, k))
 
         self.absorber.run(P.space, F, Q, noise, "F S S^T F^T + Q, two columns of F S after another", column_of, weight)
         t.section("roots")
-        self.take_roots(P.space)
-        return Root(P.space, own=True)
+        self._take_roots(P.space)
+        return ArrayRoot(P.space, self, own=True)
 
-    def take_roots(self, space: Space) -> None:
+    def _take_roots(self, space: Space) -> None:
         """From U D U^T in the arrays of the absorber to S S^T."""
         t = space.t
         U, D = self.absorber.arrays(space)
@@ -122,82 +94,99 @@ class RolledSqrt(Sqrt):
             with t.loop("i", 0, j) as i:
                 U[strict_start(j) + i] = U[strict_start(j) + i] * root
 
-    def update(self, t: Trace, P: Root, measurements: list[Measurement]  # type: ignore[override]
-               ) -> tuple[Root, Rows, Vector]:  # fmt: skip
-        (measurement,) = measurements
+    def update(
+        self, t: Trace, P: ArrayRoot, measurements: list[Scalar], motion: Displacement
+    ) -> tuple[ArrayRoot, list[AppliedGain | ArrayGain]]:
+        (scalar,) = measurements
+        nu, measurement = scalar.innovation(motion), scalar.measurement
         n, space = self.n, P.space
         P = self._owned(P)
         U, D = self.absorber.arrays(space)
-        moves = not self.steps
-        if not moves:
-            applied = next_gain(space, "gain", n, measurement.moved, self.steps)
-        elif not isinstance(measurement.moved, Displacement):
-            at_rest(space, n)
+        gain = array_of_gain(space, "gain", n, motion, self.steps) if self.steps else None
+        moved = None if self.steps else start_moved(space, n, motion)
         s = space.array("s", 2)
         first, last = space.row(measurement.h)
-        function = carlson(self.kernels, n, is_positive(measurement.r), self.weighted, moves)
-        row: list[Given] = [("h", 0), integer(t, first), integer(t, last), t.value(measurement.r)]
+        function = carlson(self.kernels, n, is_positive(measurement.r), self.weighted, moved is not None)
+        row: list[Passed] = [("h", 0), integer(t, first), integer(t, last), t.value(measurement.r)]
         weight = [t.value(measurement.g)] if self.weighted else []
-        gain: list[Given] = [t.value(measurement.nu), ("moved", 0)] if moves else [(applied.name, 0)]
-        t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *gain, (s.name, 0)])
+        target: list[Passed] = [(gain.name, 0)] if gain is not None else [t.value(nu), ("moved", 0)]
+        t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *target, (s.name, 0)])
         variance = t.name(s[0], "variance")
-        if moves:
-            return P, [Displacement(space, n, space.arrays["moved"], [], s[1])], [variance]
-        return P, [Column(space, applied, n)], [variance]
+        if moved is not None:
+            return P, [AppliedGain(moved, variance, s[1], sound=True)]
+        assert gain is not None
+        return P, [ArrayGain(t, gain, nu, variance, sound=True)]
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         self.absorber.learn(moved.space, field, rate, sure, moved.terms)
 
-    def downdated(  # type: ignore[override]
-        self, t: Trace, P: Root, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Root
-    ) -> tuple[Root, Value]:
+    def downdated(
+        self, t: Trace, P: ArrayRoot, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: ArrayRoot
+    ) -> tuple[ArrayRoot, Value]:
         n, space = self.n, P.space
         if "small" not in space.arrays:
             small = space.array("small", n)
             with t.loop("j", 0, n) as j:
-                last = t.name(self._diagonal(prior, j), "last")
+                last = t.name(prior.diagonal(j), "last")
                 total = t.variable("total", last * last)
                 with t.loop("k", j + 1, n) as k:
-                    s_jk = t.name(self._at(prior, j, k), "s_jk")
+                    s_jk = t.name(prior.at(j, k), "s_jk")
                     total.set(total.get() + s_jk * s_jk)
                 small[j] = total.get() * (tolerance * tolerance)
         P = self._owned(P)
         array, told = space.array("c", n), space.array("told", 2)
         fill(t, array, c)
-        arrays: list[Given] = [(each.name, 0) for each in (*self.absorber.arrays(space), array, space.arrays["small"])]
+        arrays: list[Passed] = [(each.name, 0) for each in (*self.absorber.arrays(space), array, space.arrays["small"])]
         t.call(remove_root(self.kernels, n), [*arrays, t.value(s), t.value(tolerance), (told.name, 0)])
         t.flag(told[1] > 0, "REGULARIZED")
         return P, told[0] > 0
 
-    def placed(self, P: Root) -> dict[str, Array]:
-        """A local array that holds P as the field of the struct does."""
+    def indefinite(self, P: ArrayRoot, tolerance: Fraction) -> tuple[ArrayRoot, list[Value]]:
+        """Never: it is a square."""
+        return P, []
+
+    def root(self, t: Trace, P: ArrayRoot, tolerance: Fraction, stored: bool, in_loops: bool) -> Array:
+        return self.root_array(t, None if stored else self._as_stored(P))
+
+    def _as_stored(self, P: ArrayRoot) -> Array:
+        """A local array that holds P as the field does."""
         P = self._owned(P)
         t, n = P.space.t, self.n
         S = P.space.array("S", n * (n + 1) // 2)
         with t.loop("j", 0, n) as j:
             with t.loop("i", 0, j) as i:
-                S[self.spot(t, i, j)] = self._at(P, i, j)
-            S[self.spot(t, j, j)] = self._diagonal(P, j)
-        return {"kf.S": S}
+                S[self.spot(t, i, j)] = P.at(i, j)
+            S[self.spot(t, j, j)] = P.diagonal(j)
+        return S
+
+    def gatherer(
+        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
+    ) -> LoopedFactors[ArrayRoot]:
+        def finish(space: Space) -> ArrayRoot:
+            t.section("roots")
+            self._take_roots(space)
+            return ArrayRoot(space, self, own=True)
+
+        return LoopedFactors(t, self.absorber, self.order, Q, noise, how, finish)
 
     # the covariance ----------------------------------------------------------------------------------
 
-    def entries(self, P: Root) -> Symmetric:  # type: ignore[override]
+    def entries(self, P: ArrayRoot) -> Symmetric:
         return Symmetric(self.n, lambda i, j: self._entry(P, i, j))
 
-    def _entry(self, P: Root, i: int, j: int) -> Value:
+    def _entry(self, P: ArrayRoot, i: int, j: int) -> Value:
         """P_ij, i <= j, summed in a loop."""
-        t, last = P.space.t, self._diagonal(P, j)
-        start = last * last if i == j else self._at(P, i, j) * last
+        t, last = P.space.t, P.diagonal(j)
+        start = last * last if i == j else P.at(i, j) * last
         if j == self.n - 1:
             return start
         total = t.variable(t.unique("total"), start)
         with t.loop("k", j + 1, self.n) as k:
-            total.set(total.get() + self._at(P, i, k) * self._at(P, j, k))
+            total.set(total.get() + P.at(i, k) * P.at(j, k))
         value = t.name(total.get(), f"p_{self.names[i]}_{self.names[j]}")
         return assume_nonnegative(value) if i == j else value
 
-    def variance(self, P: Root, h: Vector) -> Number:  # type: ignore[override]
+    def variance(self, P: ArrayRoot, h: Vector) -> Number:
         t, n, space = P.space.t, self.n, P.space
         first, _ = space.row(h)
         if first == n:
@@ -205,14 +194,14 @@ class RolledSqrt(Sqrt):
         array = space.arrays["h"]
         total = t.variable(t.unique("total"), 0)
         with t.loop("j", first, n) as j:
-            f = t.variable("f", array[j] * self._diagonal(P, j))
+            f = t.variable("f", array[j] * P.diagonal(j))
             with t.loop("i", first, j) as i:
-                f.set(f.get() + self._at(P, i, j) * array[i])
+                f.set(f.get() + P.at(i, j) * array[i])
             value = t.name(f.get(), "f_j")
             total.set(total.get() + value * value)
         return assume_nonnegative(t.name(total.get(), "spread"))
 
-    def inflated(self, P: Root, a: Number) -> Root:  # type: ignore[override]
+    def inflated(self, P: ArrayRoot, a: Number) -> ArrayRoot:
         P = self._owned(P)
         t = P.space.t
         root = t.name(sqrt(t.value(a)), "root_inflation")
@@ -221,9 +210,9 @@ class RolledSqrt(Sqrt):
                 array[i] = array[i] * root
         return P
 
-    def limit(  # type: ignore[override]
-        self, t: Trace, P: Root, floors: list[Fraction | None], ceilings: list[Fraction | None]
-    ) -> Root:
+    def limit(
+        self, t: Trace, P: ArrayRoot, floors: list[Fraction | None], ceilings: list[Fraction | None]
+    ) -> ArrayRoot:
         """variance_floor raises S_ii^2; variance_ceiling scales row i down."""
         P = self._owned(P)
         U, D = self.absorber.arrays(P.space)
@@ -243,13 +232,54 @@ class RolledSqrt(Sqrt):
                     U[strict_start(j) + i] = U[strict_start(j) + i] * scale
         return P
 
-    def evidence(self, P: Root, after_predict: bool) -> list[Value]:  # type: ignore[override]
-        return [self._diagonal(P, j) for j in range(self.n)] if after_predict else []
+    def evidence(self, P: ArrayRoot, after_predict: bool) -> list[Value]:
+        return [P.diagonal(j) for j in range(self.n)] if after_predict else []
 
-    def store(self, t: Trace, P: Root, names: list[str], after_predict: bool) -> None:  # type: ignore[override]
+    def store(self, t: Trace, P: ArrayRoot, names: list[str], after_predict: bool) -> None:
         if not P.own:
             return
         with t.loop("j", 0, self.n) as j:
             with t.loop("i", 0, j) as i:
-                t.store("kf.S", self._place(i, j), self._at(P, i, j))
-            t.store("kf.S", self._place(j, j), self._diagonal(P, j))
+                t.store("kf.S", self.place(i, j), P.at(i, j))
+            t.store("kf.S", self.place(j, j), P.diagonal(j))
+
+    def tolerance(self, P: ArrayRoot, h: Vector) -> int:
+        """None: it is a square."""
+        return 0
+
+    # mixtures ----------------------------------------------------------------------------------------
+
+    def mixture(
+        self, t: Trace, own: Part, others: list[Part], spread: list[tuple[Array, Number]],
+        place: Callable[[Value], Value],
+    ) -> dict[str, Array]:  # fmt: skip
+        """By way of U D U^T, as a prediction."""
+        n, space, weight = self.n, Space(t), own.weight
+        U, D = self.absorber.arrays(space)
+        source = own.element("kf.S")
+        with t.loop("j", 0, n) as j:
+            d = t.name(source(self.spot(t, j, j)), "d")
+            inverse = t.name(reciprocal(assume_nonnegative(d))[1], "inverse")
+            D[j] = t.value(times(weight, d * d))
+            with t.loop("i", 0, j) as i:
+                U[strict_start(j) + i] = 0 if is_zero(weight) else source(self.spot(t, i, j)) * inverse
+        for part in others:
+            self._add(space, part)
+        self.absorber.add_spread(space, spread, place)
+        self._take_roots(space)
+        return {"kf.S": self._as_stored(ArrayRoot(space, self, own=True))}
+
+    def _add(self, space: Space, part: Part) -> None:
+        t, element = space.t, part.element("kf.S")
+
+        def column_of(k: Value, entry: Put) -> None:
+            with t.loop("i", 0, k + 1) as i:
+                entry(i, element(self.spot(t, i, k)))
+
+        def factor(k: int | Value) -> Value:
+            if isinstance(k, int):  # its column is taken as a unit vector
+                first = element(self.spot(t, k, k))
+                return t.value(times(part.weight, first * first))
+            return t.value(part.weight)
+
+        self.absorber.add(space, column_of, factor)

@@ -1,16 +1,11 @@
-"""Covariance kept as its lower Cholesky factor, P = S S^T (Carlson 1973; Kaminski, Bryson & Schmidt 1971).
-
-Inside, the states are in reverse order: S is then upper triangular, and the kernels of U D U^T serve it too.
-"""
+"""The lower Cholesky factor in straight-line code (Carlson 1973; Kaminski, Bryson & Schmidt 1971)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from fractions import Fraction
 
-from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.factors import columns_of, root_of_factors, udu
-from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, plus, quotients, times, zeros
 from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import (
     Number,
@@ -26,45 +21,23 @@ from kfgen.filters.algebra.numbers import (
 )  # fmt: skip
 from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.base import CONST_KF, KF, Block
-from kfgen.filters.covariance.base import Covariance, GainChange
+from kfgen.filters.covariance.gather import GatheredFactors
+from kfgen.filters.covariance.loops.partly import FactorsInLoops
+from kfgen.filters.covariance.motion import VectorGain
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
-from kfgen.filters.frame.triangles import upper_start
-from kfgen.ir.program import Argument, Function
-from kfgen.ir.schedule import schedule
+from kfgen.filters.covariance.parts import Columns, Gatherer, Gathering, Motion, Scalar
+from kfgen.filters.covariance.sqrt.store import SqrtStore
+from kfgen.filters.covariance.straight import StraightLine
 from kfgen.ir.trace import Array, Trace, Value
 
 
-class Sqrt:
-    """Layout `sqrt`. A covariance is the rows of S, upper triangular in the inner order."""
+class StraightSqrt(StraightLine, SqrtStore):
+    """A covariance is the rows of S, upper triangular in the inner order."""
 
-    title = "lower triangular square root"
-    reorders = False
-    rolled = False
-    tables: Mapping[str, tuple[int, ...]] = {}
-    change: GainChange | None = None
-    factored = True
     group = 1
 
-    def __init__(self, n: int) -> None:
-        self.n = n
-        self.order = list(reversed(range(n)))
-
-    def packed(self, i: int, j: int) -> int:
-        """Position of S_ij, i <= j: lower triangle row by row in the order of the spec."""
-        row, place = self.n - 1 - i, self.n - 1 - j
-        return row * (row + 1) // 2 + place
-
-    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
-        n = self.n
-        U, D = udu([list(row) for row in P0])
-        roots = [Fraction(0) if d == 0 else constant_root(d) for d in D]
-        values = [Fraction(0)] * (n * (n + 1) // 2)
-        for j in range(n):
-            for i in range(j + 1):
-                values[self.packed(i, j)] = roots[j] * (1 if i == j else Fraction(U[i][j]))
-        doc = "lower triangular root by rows: P = S S^T"
-        return [Block("S", len(values), doc, initial=tuple(values))]
+    def plain(self) -> StraightSqrt:
+        return self
 
     def load(self, t: Trace) -> Rows:
         n = self.n
@@ -85,7 +58,7 @@ class Sqrt:
         rank_one(U, D, [(w, d, -1) for w, d in noise], safe=True)
         t.section("F S S^T F^T + Q")
         for k in range(n):
-            column_k: Vector = [linalg.dot(F[i][: k + 1], [P[j][k] for j in range(k + 1)]) for i in range(n)]
+            column_k: Vector = [dot(F[i][: k + 1], [P[j][k] for j in range(k + 1)]) for i in range(n)]
             rank_one(U, D, [(column_k, t.one, k)], safe=True)
         return self.from_factors(t, U, D)
 
@@ -93,23 +66,42 @@ class Sqrt:
         t.section("roots")
         return root_of_factors(U, D)
 
+    def from_entries(self, P: Symmetric) -> Rows:
+        return root_of_factors(*udu([[P[i, j] for j in range(self.n)] for i in range(self.n)]))
+
     def factors(self, P: Rows) -> tuple[Rows, Vector]:
         n = self.n
-        U, D = linalg.zeros(n, n), [linalg.times(P[j][j], P[j][j]) for j in range(n)]
+        U, D = zeros(n, n), [times(P[j][j], P[j][j]) for j in range(n)]
         for j in range(1, n):
             inverse = reciprocal(assume_nonnegative(P[j][j]))[1]
             for i in range(j):
-                U[i][j] = linalg.times(P[i][j], inverse)
+                U[i][j] = times(P[i][j], inverse)
         return U, [assume_nonnegative(d) for d in D]
 
     def columns(self, P: Rows) -> list[tuple[Vector, Number]]:
         return [(column, 1) for column in columns_of(P)]
 
-    def root(self, P: Rows, tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
+    def root(self, t: Trace, P: Rows, tolerance: Fraction, stored: bool, in_loops: bool) -> Array | Columns:
+        if stored and in_loops:
+            return self.root_array(t)
         # in the order of the spec's lower factor: its first column is the inner order's last
-        return columns_of(P)[::-1], []
+        return Columns(columns_of(P)[::-1], [])
 
-    def downdated(self, t: Trace, P: Rows, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Covariance
+    def gatherer(
+        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
+    ) -> Gatherer[Rows]:
+        def finish(U: Rows, D: Vector) -> Rows:
+            return self.from_factors(t, U, D)
+
+        if how.in_loops:
+            return FactorsInLoops(t, self.order, Q, noise, how, finish)
+        return GatheredFactors(t, Q, noise, how, finish)
+
+    def indefinite(self, P: Rows, tolerance: Fraction) -> tuple[Rows, list[Value]]:
+        """Never: it is a square."""
+        return P, []
+
+    def downdated(self, t: Trace, P: Rows, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Rows
     ) -> tuple[Rows, Value]:
         """S S^T - w w^T, w = c / sqrt(s), by the downdate of van der Merwe & Wan 2001 (Golub & Van Loan 6.5.4).
 
@@ -119,13 +111,13 @@ class Sqrt:
         n = self.n
         S = [list(row) for row in P]
         scale = 1 / sqrt(s)
-        w = [linalg.times(x, scale) for x in c]
+        w = [times(x, scale) for x in c]
         failed: Value = t.wrapped(t.pool.boolean(False))
         left: Value = t.wrapped(t.pool.boolean(True))  # whether there is still something to take away
         for j in reversed(range(n)):
             if is_zero(w[j]):
                 continue
-            small = tolerance * tolerance * linalg.dot(prior[j][j:], prior[j][j:])
+            small = tolerance * tolerance * dot(prior[j][j:], prior[j][j:])
             acts = left & (w[j] * w[j] > small)
             square = S[j][j] * S[j][j] - w[j] * w[j]
             limit = S[j][j] * S[j][j] * tolerance
@@ -142,20 +134,20 @@ class Sqrt:
             quotient = select(acts, S[j][j] * (1 / r), 1)
             S[j][j] = select(gone, 0, select(acts, r, S[j][j]))
             for i in range(j):
-                new = linalg.times(linalg.minus(S[i][j], linalg.times(sine, w[i])), quotient)
-                w[i] = linalg.minus(linalg.times(cosine, w[i]), linalg.times(sine, new))
+                new = times(minus(S[i][j], times(sine, w[i])), quotient)
+                w[i] = minus(times(cosine, w[i]), times(sine, new))
                 S[i][j] = select(gone, 0, new)
         return S, failed
 
-    def update(self, t: Trace, P: Rows, measurements: list[Measurement]) -> tuple[Rows, Rows, Vector]:
-        """Scalar measurements one after another: S, the gains (m, n) and the innovation variances (m,)."""
+    def update(
+        self, t: Trace, P: Rows, measurements: list[Scalar], motion: Motion
+    ) -> tuple[Rows, list[VectorGain]]:
         S = [list(row) for row in P]
-        gains, s = [], []
-        for measurement in measurements:
-            K, variance = self._carlson(S, measurement)
-            gains.append(K)
-            s.append(variance)
-        return S, gains, s
+        gains = []
+        for scalar in measurements:
+            K, s = self._carlson(S, scalar.measurement)
+            gains.append(VectorGain(K, s, scalar.innovation))
+        return S, gains
 
     def _carlson(self, S: Rows, measurement: Measurement) -> tuple[Vector, Number]:
         """Carlson's update in place (1973, eq. 16 to 20), with the weight g.
@@ -168,10 +160,10 @@ class Sqrt:
         a = measurement.r
         before: tuple[Number, Number] | None = None  # sqrt(a), 1 / sqrt(a)
         for j in range(n):
-            f = linalg.dot([S[i][j] for i in range(j + 1)], h[: j + 1])
+            f = dot([S[i][j] for i in range(j + 1)], h[: j + 1])
             if is_zero(f):
                 continue
-            weighted = linalg.times(g, f)
+            weighted = times(g, f)
             before = _root(a) if before is None else before
             sure = is_positive(a)
             a = a + weighted * f
@@ -184,23 +176,23 @@ class Sqrt:
             gamma = weighted * after[1] * before[1]
             for i in range(j):
                 old = S[i][j]
-                S[i][j] = linalg.minus(linalg.times(beta, old), linalg.times(gamma, b[i]))
-                b[i] = linalg.plus(b[i], linalg.times(f, old))
-            b[j] = linalg.times(f, S[j][j])
-            S[j][j] = assume_nonnegative(linalg.times(beta, S[j][j]))
+                S[i][j] = minus(times(beta, old), times(gamma, b[i]))
+                b[i] = plus(b[i], times(f, old))
+            b[j] = times(f, S[j][j])
+            S[j][j] = assume_nonnegative(times(beta, S[j][j]))
             before = after
-        return linalg.quotients(b, a, measurement.r), a
+        return quotients(b, a, measurement.r), a
 
     def entries(self, P: Rows) -> Symmetric:
-        return Symmetric(self.n, lambda i, j: linalg.dot(P[i][j:], P[j][j:]))
+        return Symmetric(self.n, lambda i, j: dot(P[i][j:], P[j][j:]))
 
     def variance(self, P: Rows, h: Vector) -> Number:
-        f = [linalg.dot([P[i][j] for i in range(j + 1)], h[: j + 1]) for j in range(self.n)]
-        return linalg.dot(f, f)
+        f = [dot([P[i][j] for i in range(j + 1)], h[: j + 1]) for j in range(self.n)]
+        return dot(f, f)
 
     def inflated(self, P: Rows, a: Number) -> Rows:
         root = sqrt(a)
-        return [[linalg.times(x, root) for x in row] for row in P]
+        return [[times(x, root) for x in row] for row in P]
 
     def tolerance(self, P: Rows, h: Vector) -> Value | int:
         """None: a sum of squares is not negative."""
@@ -217,7 +209,7 @@ class Sqrt:
                 edge = constant_root(high)
                 t.flag(P[i][i] > edge, "REGULARIZED")
                 scale = select(P[i][i] > edge, edge / P[i][i], 1)
-                P[i] = [linalg.times(x, scale) for x in P[i]]
+                P[i] = [times(x, scale) for x in P[i]]
         return P
 
     def evidence(self, P: Rows, after_predict: bool) -> list[Value]:
@@ -228,63 +220,6 @@ class Sqrt:
         for i in reversed(range(self.n)):
             for j in reversed(range(i, self.n)):
                 t.store("kf.S", self.packed(i, j), t.name(t.value(P[i][j]), f"s_{names[i]}_{names[j]}"))
-
-    def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
-        """The root in and out."""
-        return [self._set_root(taken, outdated), self._get_root(taken)]
-
-    def _set_root(self, taken: frozenset[str], outdated: str) -> Function:
-        t, n = Trace(), self.n
-        with t.loop("i", 0, n) as i, t.loop("j", 0, i + 1) as j:
-            t.guard(~t.finite(t.element("S", i * n + j)), "NOT_FINITE")
-        t.section("columns may change their sign: the diagonal is kept positive")
-        with t.loop("i", 0, n) as i, t.loop("j", 0, i + 1) as j:
-            value = t.name(t.element("S", i * n + j), "value")
-            t.store("kf.S", upper_start(i) + j, select(t.element("S", j * n + j) < 0, -value, value))
-        if outdated:
-            t.store(outdated, None, t.wrapped(t.pool.boolean(False)))
-        doc = "lower triangular root, row-major; the lower triangle is read"
-        argument = Argument("S", "{name}_real_t", pointer=True, size=n * n, doc=doc)
-        return Function(
-            "set_sqrt_covariance", [KF, argument], schedule(t, taken | {"x", "S"}),
-            "Replace the covariance by S S^T; the state stays.",
-        )  # fmt: skip
-
-    def _get_root(self, taken: frozenset[str]) -> Function:
-        t, n = Trace(), self.n
-        with t.loop("i", 0, n) as i:
-            with t.loop("j", 0, i + 1) as j:
-                t.store("S", i * n + j, t.element("kf.S", upper_start(i) + j))
-            with t.loop("j", i + 1, n) as j:
-                t.store("S", i * n + j, t.zero)
-        doc = "lower triangular root, row-major"
-        argument = Argument("S", "{name}_real_t", pointer=True, constant=False, size=n * n, doc=doc)
-        return Function(
-            "get_sqrt_covariance", [CONST_KF, argument], schedule(t, taken | {"x", "S"}),
-            "The lower Cholesky factor of the covariance, in the order of the states.", returns="void",
-        )  # fmt: skip
-
-    # covariance in and out, as loops -------------------------------------------------------------------
-
-    def _place(self, i: Value, j: Value) -> Value:
-        """Position of S_ij for counters i <= j."""
-        return upper_start((self.n - 1) - i) + ((self.n - 1) - j)
-
-    def get(self, t: Trace, i: Value, j: Value) -> Value:
-        """P_ij for counters i <= j, summed in a loop."""
-        total = t.variable("sum", t.zero)
-        with t.loop("k", j, self.n) as k:
-            total.set(total.get() + t.element("kf.S", self._place(i, k)) * t.element("kf.S", self._place(j, k)))
-        return total.get()
-
-    def put(self, t: Trace, P: Array, factors: Array) -> None:
-        """Store the root of a covariance given by its factors (D on the diagonal, U above)."""
-        with t.loop("j", 0, self.n) as j:
-            root = t.name(sqrt(factors[upper_start(j) + j]), "root")
-            t.store("kf.S", self._place(j, j), root)
-            if self.n > 1:
-                with t.loop("i", 0, j) as i:
-                    t.store("kf.S", self._place(i, j), factors[upper_start(j) + i] * root)
 
 
 def _root(a: Number) -> tuple[Number, Number]:

@@ -1,41 +1,41 @@
-"""Covariance kept as U D U^T, in loops: layout `ud` for size, the same fields and the same numbers."""
+"""U D U^T in loops: for size; the same fields and the same numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
 
-from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Rows, Vector
-from kfgen.filters.algebra.measurement import Measurement
+from kfgen.filters.algebra.linalg import Rows, Vector, times
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_positive, is_zero
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.covariance.base import GainChange
-from kfgen.filters.covariance.kernels.absorber import Absorber
+from kfgen.filters.covariance.kernels.function import Passed, integer
 from kfgen.filters.covariance.kernels.points import solve
 from kfgen.filters.covariance.kernels.updates import bierman
-from kfgen.filters.covariance.looped import (
-    Column,
+from kfgen.filters.covariance.loops.absorber import Absorber
+from kfgen.filters.covariance.loops.gather import LoopedFactors
+from kfgen.filters.covariance.loops.looped import Looped, Looping
+from kfgen.filters.covariance.loops.motion import (
+    AppliedGain,
+    ArrayGain,
     Displacement,
-    Given,
-    Kernels,
-    Space,
-    at_rest,
+    array_of_gain,
     changed_gain,
-    fill,
-    integer,
-    next_gain,
+    start_moved,
 )
+from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.ud.straight import UD
+from kfgen.filters.covariance.parts import Gatherer, Gathering, Part, Scalar
+from kfgen.filters.covariance.ud.store import UDStore
+from kfgen.filters.covariance.ud.straight import StraightUD, limited
 from kfgen.filters.frame.runs import Put
-from kfgen.filters.frame.triangles import strict, strict_start
+from kfgen.filters.frame.triangles import strict, strict_size, strict_start
 from kfgen.ir.trace import Array, Trace, Value
 
 
 @dataclass(frozen=True)
-class Factors:
+class ArrayFactors:
     """U and D: those of the struct, or the function's own arrays, of which only the last version counts."""
 
     space: Space
@@ -50,51 +50,47 @@ class Factors:
         return found
 
 
-class RolledUD(UD):
-    """Layout `ud` in loops. The update by joseph's form is Bierman's and, for a changed gain, a rank-one term."""
+class LoopedUD(Looped, UDStore):
+    """The update by joseph's form is Bierman's and, for a changed gain, a rank-one term."""
 
-    group = 1
-    rolled = True
-
-    def __init__(
-        self, order: list[int], update: str, change: GainChange | None, names: list[str], kernels: Kernels,
-        weighted: bool, steps: bool, table: tuple[str, str],
-    ) -> None:  # fmt: skip
-        """names: of the states in the inner order. weighted: whether measurements may have a weight. steps:
-        whether what each measurement moves the state by is asked for. table: as of Absorber."""
-        super().__init__(order, update, change)
-        self.group = 1
-        self.names = names
-        self.kernels = kernels
-        self.weighted = weighted
-        self.steps = steps
-        self.absorber = Absorber(names, kernels, table)
+    def __init__(self, sibling: StraightUD, how: Looping) -> None:
+        Looped.__init__(self, sibling, how)
+        UDStore.__init__(self, sibling.order)
+        self.form = sibling.form
+        self.change = sibling.change
+        self.absorber = Absorber(how.names, how.kernels, how.table)
 
     @property
-    def tables(self) -> Mapping[str, tuple[int, ...]]:  # type: ignore[override]
+    def tables(self) -> Mapping[str, tuple[int, ...]]:
         return self.absorber.tables
 
-    def load(self, t: Trace) -> Factors:  # type: ignore[override]
-        return Factors(Space(t), own=False)
+    def plain(self) -> LoopedUD:
+        if self.change is None:
+            return self
+        other = copy(self)
+        other.change = None
+        return other
 
-    def _owned(self, P: Factors) -> Factors:
+    def load(self, t: Trace) -> ArrayFactors:
+        return ArrayFactors(Space(t), own=False)
+
+    def _owned(self, P: ArrayFactors) -> ArrayFactors:
         """P in arrays that may be changed."""
         if P.own:
             return P
         t, n, space = P.space.t, self.n, P.space
         U, D = self.absorber.arrays(space)
-        with t.loop("i", 0, n * (n - 1) // 2) as i:
+        with t.loop("i", 0, strict_size(n)) as i:
             U[i] = t.element("kf.U", i)
         with t.loop("i", 0, n) as i:
             D[i] = t.element("kf.D", i)
-        return Factors(space, own=True)
+        return ArrayFactors(space, own=True)
 
-    # predict -----------------------------------------------------------------------------------------
+    # steps -------------------------------------------------------------------------------------------
 
-    def predict(self, t: Trace, P: Factors, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]  # type: ignore[override]
-                ) -> Factors:  # fmt: skip
-        """F U D U^T F^T + Q + sum of d w w^T."""
-
+    def predict(
+        self, t: Trace, P: ArrayFactors, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]
+    ) -> ArrayFactors:
         def weight(k: int | Value) -> Value:
             return t.element("kf.D", k)
 
@@ -105,25 +101,23 @@ class RolledUD(UD):
 
         title = "F U D U^T F^T + Q, two columns of F U after another"
         self.absorber.run(P.space, F, Q, noise, title, column_of, weight)
-        return Factors(P.space, own=True)
+        return ArrayFactors(P.space, own=True)
 
-    # update ------------------------------------------------------------------------------------------
-
-    def update(self, t: Trace, P: Factors, measurements: list[Measurement]  # type: ignore[override]
-               ) -> tuple[Factors, Rows, Vector]:  # fmt: skip
-        (measurement,) = measurements
+    def update(
+        self, t: Trace, P: ArrayFactors, measurements: list[Scalar], motion: Displacement
+    ) -> tuple[ArrayFactors, list[AppliedGain | ArrayGain]]:
+        (scalar,) = measurements
+        nu, measurement = scalar.innovation(motion), scalar.measurement
         n, space = self.n, P.space
         P = self._owned(P)
         U, D = self.absorber.arrays(space)
         moves = self.change is None and not self.steps
-        if not moves:
-            applied = next_gain(space, "gain", n, measurement.moved, self.steps)
-        if moves and not isinstance(measurement.moved, Displacement):
-            at_rest(space, n)
+        gain = None if moves else array_of_gain(space, "gain", n, motion, self.steps)
+        moved = start_moved(space, n, motion) if moves else None
         s = space.array("s", 2)
         seen = [i for i, x in enumerate(measurement.h) if not is_zero(x)]
         function = bierman(self.kernels, n, len(seen) == 1, is_positive(measurement.r), self.weighted, moves)
-        row: list[Given]
+        row: list[Passed]
         if len(seen) == 1:
             row = [integer(t, seen[0]), t.value(measurement.h[seen[0]])]
         else:
@@ -131,50 +125,29 @@ class RolledUD(UD):
             row = [("h", 0), integer(t, first), integer(t, last)]
         row.append(t.value(measurement.r))
         weight = [t.value(measurement.g)] if self.weighted else []
-        gain: list[Given] = [t.value(measurement.nu), ("moved", 0)] if moves else [(applied.name, 0)]
-        t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *gain, (s.name, 0)])
+        target: list[Passed] = [(gain.name, 0)] if gain is not None else [t.value(nu), ("moved", 0)]
+        t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *target, (s.name, 0)])
         variance = t.name(s[0], "variance")
-        if moves:
-            return P, [Displacement(space, n, space.arrays["moved"], [], s[1])], [variance]
+        if moved is not None:
+            return P, [AppliedGain(moved, variance, s[1], sound=True)]
+        assert gain is not None
         if self.change is not None:
             t.section("the gain that is applied differs from K by w: + s w w^T")
             w = self.absorber.columns(space)
-            changed_gain(t, self.change, applied, w, n)
-            added = t.value(linalg.times(measurement.g, variance))
+            changed_gain(t, self.change, gain, w, n)
+            added = t.value(times(measurement.g, variance))
             self.absorber.absorb(space, False, [added, t.zero], integer(t, n))
-        return P, [Column(space, applied, n)], [variance]
+        return P, [ArrayGain(t, gain, nu, variance, sound=True)]
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         self.absorber.learn(moved.space, field, rate, sure, moved.terms)
 
-    def downdated(  # type: ignore[override]
-        self, t: Trace, P: Factors, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Factors
-    ) -> tuple[Factors, Value]:
-        P = self._owned(P)
-        array = P.space.array("c", self.n)
-        fill(t, array, c)
-        known = None if sure else tolerance
-        # the points' rounding is in c
-        return P, self.absorber.remove(P.space, array, t.value(s), 1024 * tolerance, known)
-
-    def solved(self, t: Trace, name: str, c: Vector, tolerance: Fraction) -> Vector:
-        """P^-1 c of the struct's P, in a local array."""
-        array = t.array(name, self.n)
-        fill(t, array, c)
-        t.call(solve(self.kernels, self.n), [("kf.U", 0), ("kf.D", 0), (array.name, 0), t.value(tolerance)])
-        return [array[i] for i in range(self.n)]
-
-    def placed(self, P: Factors) -> dict[str, Array]:
-        """Local arrays that hold P as the fields of the struct do."""
-        U, D = self.absorber.arrays(self._owned(P).space)
-        return {"kf.U": U, "kf.D": D}
-
     # the covariance ----------------------------------------------------------------------------------
 
-    def entries(self, P: Factors) -> Symmetric:  # type: ignore[override]
+    def entries(self, P: ArrayFactors) -> Symmetric:
         return Symmetric(self.n, lambda i, j: self._entry(P, i, j))
 
-    def _entry(self, P: Factors, i: int, j: int) -> Value:
+    def _entry(self, P: ArrayFactors, i: int, j: int) -> Value:
         """P_ij, i <= j, summed in a loop."""
         t, n = P.space.t, self.n
         start = P.d(j) if i == j else P.d(j) * P.u(strict(i, j))
@@ -187,7 +160,7 @@ class RolledUD(UD):
         value = t.name(total.get(), f"p_{self.names[i]}_{self.names[j]}")
         return assume_nonnegative(value) if i == j else value
 
-    def variance(self, P: Factors, h: Vector) -> Number:  # type: ignore[override]
+    def variance(self, P: ArrayFactors, h: Vector) -> Number:
         t, n, space = P.space.t, self.n, P.space
         first, _ = space.row(h)
         if first == n:
@@ -202,35 +175,106 @@ class RolledUD(UD):
             total.set(total.get() + v * v * P.d(j))
         return assume_nonnegative(t.name(total.get(), "spread"))
 
-    def inflated(self, P: Factors, a: Number) -> Factors:  # type: ignore[override]
+    def inflated(self, P: ArrayFactors, a: Number) -> ArrayFactors:
         P = self._owned(P)
         t, D = P.space.t, P.space.arrays["diagonal"]
         with t.loop("i", 0, self.n) as i:
             D[i] = D[i] * t.value(a)
         return P
 
-    def limit(  # type: ignore[override]
-        self, t: Trace, P: Factors, floors: list[Fraction | None], ceilings: list[Fraction | None]
-    ) -> Factors:
+    def tolerance(self, P: ArrayFactors, h: Vector) -> int:
+        """None: a sum of D_j f_j^2 is not negative."""
+        return 0
+
+    def limit(
+        self, t: Trace, P: ArrayFactors, floors: list[Fraction | None], ceilings: list[Fraction | None]
+    ) -> ArrayFactors:
         P = self._owned(P)
         array = P.space.arrays["diagonal"]
         D: Vector = [t.name(array[j], f"d_{name}") for j, name in enumerate(self.names)]
-        limited = super().limit(t, ([], list(D)), floors, ceilings)[1]
-        for j, (new, old) in enumerate(zip(limited, D, strict=True)):
+        for j, (new, old) in enumerate(zip(limited(t, D, floors, ceilings), D, strict=True)):
             if new is not old:
                 array[j] = new
         return P
 
-    def evidence(self, P: Factors, after_predict: bool) -> list[Value]:  # type: ignore[override]
+    def evidence(self, P: ArrayFactors, after_predict: bool) -> list[Value]:
         if not (after_predict or self.form == "joseph"):
             return []
         return [P.d(j) for j in range(self.n)]
 
-    def store(self, t: Trace, P: Factors, names: list[str], after_predict: bool) -> None:  # type: ignore[override]
+    def store(self, t: Trace, P: ArrayFactors, names: list[str], after_predict: bool) -> None:
         n = self.n
         if not P.own:
             return
-        with t.loop("i", 0, n * (n - 1) // 2) as i:
+        with t.loop("i", 0, strict_size(n)) as i:
             t.store("kf.U", i, P.u(i))
         with t.loop("i", 0, n) as i:
             t.store("kf.D", i, P.d(i))
+
+    # sigma points ------------------------------------------------------------------------------------
+
+    def root(self, t: Trace, P: ArrayFactors, tolerance: Fraction, stored: bool, in_loops: bool) -> Array:
+        if stored:
+            return self.root_array(t)
+        U, D = self.absorber.arrays(self._owned(P).space)
+        return self.root_array(t, {"kf.U": U, "kf.D": D})
+
+    def gatherer(
+        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
+    ) -> Gatherer[ArrayFactors]:
+        return LoopedFactors(t, self.absorber, self.order, Q, noise, how, lambda space: ArrayFactors(space, own=True))
+
+    def downdated(
+        self, t: Trace, P: ArrayFactors, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: ArrayFactors
+    ) -> tuple[ArrayFactors, Value]:
+        P = self._owned(P)
+        array = P.space.array("c", self.n)
+        fill(t, array, c)
+        known = None if sure else tolerance
+        # the points' rounding is in c
+        return P, self.absorber.remove(P.space, array, t.value(s), 1024 * tolerance, known)
+
+    def indefinite(self, P: ArrayFactors, tolerance: Fraction) -> tuple[ArrayFactors, list[Value]]:
+        """Never: D is not negative."""
+        return P, []
+
+    def solved(self, t: Trace, P: ArrayFactors, columns: list[Vector], tolerance: Fraction) -> Rows:
+        """P: as it stands in the struct. The rows are in local arrays."""
+        out: Rows = []
+        for a, c in enumerate(columns):
+            array = t.array(f"h_{a}", self.n)
+            fill(t, array, c)
+            t.call(solve(self.kernels, self.n), [("kf.U", 0), ("kf.D", 0), (array.name, 0), t.value(tolerance)])
+            out.append([array[i] for i in range(self.n)])
+        return out
+
+    # mixtures ----------------------------------------------------------------------------------------
+
+    def mixture(
+        self, t: Trace, own: Part, others: list[Part], spread: list[tuple[Array, Number]],
+        place: Callable[[Value], Value],
+    ) -> dict[str, Array]:  # fmt: skip
+        n, space = self.n, Space(t)
+        U, D = self.absorber.arrays(space)
+        u, d = own.element("kf.U"), own.element("kf.D")
+        with t.loop("i", 0, strict_size(n)) as i:
+            U[i] = 0 if is_zero(own.weight) else u(i)
+        with t.loop("i", 0, n) as i:
+            D[i] = t.value(times(own.weight, d(i)))
+        for part in others:
+            self._add(space, part)
+        self.absorber.add_spread(space, spread, place)
+        return {"kf.U": U, "kf.D": D}
+
+    def _add(self, space: Space, part: Part) -> None:
+        t, upper, diagonal = space.t, part.element("kf.U"), part.element("kf.D")
+
+        def column_of(k: Value, entry: Put) -> None:
+            with t.loop("i", 0, k) as i:
+                entry(i, upper(strict_start(k) + i))
+            entry(k, t.one)
+
+        def factor(k: int | Value) -> Value:
+            return t.value(times(part.weight, assume_nonnegative(diagonal(k))))
+
+        self.absorber.add(space, column_of, factor)

@@ -1,61 +1,50 @@
-"""Covariance kept as P = U D U^T: U unit upper triangular, D diagonal (Bierman 1977; Thornton 1976)."""
+"""U D U^T in straight-line code (Bierman 1977; Thornton 1976)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from fractions import Fraction
 
-from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.factors import columns_of, factor_columns, gram_schmidt, root_of_factors, udu
-from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.factors import columns_of, factor_columns, gram_schmidt, root_of_factors, solved, udu
+from kfgen.filters.algebra.linalg import Rows, Vector, dot, quotients, times
 from kfgen.filters.algebra.measurement import Measurement, bierman, downdate
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_one, is_zero, require_nonnegative, select
 from kfgen.filters.algebra.rank_one import rank_one, unit_columns
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
-from kfgen.filters.base import Block
-from kfgen.filters.covariance.base import Covariance, GainChange
+from kfgen.filters.covariance.gather import GatheredFactors
+from kfgen.filters.covariance.loops.partly import FactorsInLoops
+from kfgen.filters.covariance.motion import VectorGain
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
-from kfgen.filters.frame.triangles import strict, strict_start, upper_start
-from kfgen.ir.program import Function
+from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Scalar
+from kfgen.filters.covariance.straight import StraightLine
+from kfgen.filters.covariance.ud.store import UDStore
+from kfgen.filters.frame.triangles import strict
 from kfgen.ir.trace import Array, Trace, Value
 
+Factors = tuple[Rows, Vector]
+"""U (n, n) and D (n,)."""
 
-class UD:
-    """Layout `ud`, with the updates `bierman` and `joseph`."""
 
-    title = "U D U^T"
-    reorders = True
-    rolled = False
-    tables: Mapping[str, tuple[int, ...]] = {}
-    factored = True
+class StraightUD(StraightLine, UDStore):
+    """The updates `bierman` and `joseph`."""
 
     def __init__(self, order: list[int], update: str, change: GainChange | None = None) -> None:
-        self.order = order
-        self.n = n = len(order)
+        super().__init__(order)
         self.form = update
         self.change = change
         # Elements of U are fetched once for a group of columns; the columns have to stay in registers.
-        self.group = max(2, 40 // n)
+        self.group = max(2, 40 // self.n)
 
-    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
-        n = self.n
-        U, D = udu([list(row) for row in P0])
-        flat = tuple(Fraction(U[i][j]) for j in range(n) for i in range(j))
-        out = []
-        if n > 1:
-            out.append(Block("U", n * (n - 1) // 2, "unit upper triangular factor, strict upper triangle by columns",
-                             initial=flat))  # fmt: skip
-        out.append(Block("D", n, "diagonal factor: P = U D U^T", initial=tuple(Fraction(d) for d in D)))
-        return out
+    def plain(self) -> StraightUD:
+        return self if self.change is None else StraightUD(self.order, self.form)
 
-    def load(self, t: Trace) -> tuple[Rows, Vector]:
+    def load(self, t: Trace) -> Factors:
         n = self.n
         U: Rows = [[t.element("kf.U", strict(i, j)) if i < j else t.zero for j in range(n)] for i in range(n)]
         D = [assume_nonnegative(t.element("kf.D", j)) for j in range(n)]
         return U, D
 
-    def predict(self, t: Trace, P: tuple[Rows, Vector], F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]
-                ) -> tuple[Rows, Vector]:  # fmt: skip
+    def predict(self, t: Trace, P: Factors, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]
+                ) -> Factors:  # fmt: skip
         """P <- F P F^T + Q + sum of d w w^T over the noise columns (w, d)."""
         U, D = P
         n = self.n
@@ -86,38 +75,35 @@ class UD:
             t.section(what + ("" if len(columns) <= self.group else f", columns {k} to {k + len(part) - 1}"))
             rank_one(U, D, part)
 
-    def update(self, t: Trace, P: tuple[Rows, Vector], measurements: list[Measurement]
-               ) -> tuple[tuple[Rows, Vector], Rows, Vector]:  # fmt: skip
-        """Scalar measurements one after another: P, the gains (m, n) and the innovation variances (m,)."""
+    def update(self, t: Trace, P: Factors, measurements: list[Scalar], motion: Motion
+               ) -> tuple[Factors, list[VectorGain]]:  # fmt: skip
         U, D = [list(row) for row in P[0]], list(P[1])
+        scalars = [each.measurement for each in measurements]
         if self.form == "joseph":
-            gains, s = [], []
-            for measurement in measurements:
-                K, variance = self._joseph(U, D, measurement)
-                gains.append(K)
-                s.append(variance)
+            made = [self._joseph(U, D, measurement) for measurement in scalars]
         else:
-            gains, s = bierman(U, D, measurements)
-        return (U, D), gains, s
+            made = list(zip(*bierman(U, D, scalars), strict=True))
+        gains = [VectorGain(K, s, each.innovation) for (K, s), each in zip(made, measurements, strict=True)]
+        return (U, D), gains
 
     def _joseph(self, U: Rows, D: Vector, measurement: Measurement) -> tuple[Vector, Value]:
         """(I - g K h) P (I - g K h)^T + g r K K^T by weighted Gram-Schmidt of [(g K h - I) U | K], weights [D, g r]."""
         n = self.n
         r, g = measurement.r, measurement.g
         f, v = self._projected(U, D, measurement.h)
-        s = r + linalg.times(g, linalg.dot(f, v))
-        c = [linalg.dot([1] + [U[i][j] for j in range(i + 1, n)], v[i:]) for i in range(n)]
-        K = linalg.quotients(c, s, r)
+        s = r + times(g, dot(f, v))
+        c = [dot([1] + [U[i][j] for j in range(i + 1, n)], v[i:]) for i in range(n)]
+        K = quotients(c, s, r)
         if self.change is not None:
             K = self.change(K)
-        weighted = [linalg.times(g, k) for k in K]
+        weighted = [times(g, k) for k in K]
         rows = [
             [weighted[i] * f[j] - (U[i][j] if j > i else 1 if j == i else 0)
              if not is_zero(K[i]) and not is_zero(f[j])
              else -(U[i][j]) if j > i else -1 if j == i else 0 for j in range(n)] + [K[i]]
             for i in range(n)
         ]  # fmt: skip
-        U1, D1 = gram_schmidt(rows, [*D, linalg.times(g, r)])
+        U1, D1 = gram_schmidt(rows, [*D, times(g, r)])
         for i in range(n):
             D[i] = D1[i]
             U[i][:] = U1[i]
@@ -125,37 +111,30 @@ class UD:
 
     def _projected(self, U: Rows, D: Vector, h: Vector) -> tuple[Vector, Vector]:
         """f = U^T h^T and v = D f."""
-        f = [linalg.dot([U[i][j] for i in range(j)] + [1], h[: j + 1]) for j in range(self.n)]
+        f = [dot([U[i][j] for i in range(j)] + [1], h[: j + 1]) for j in range(self.n)]
         return f, [fj if is_zero(fj) else d * fj for d, fj in zip(D, f, strict=True)]
 
-    def entries(self, P: tuple[Rows, Vector]) -> Symmetric:
+    def entries(self, P: Factors) -> Symmetric:
         return assembled(*P)
 
-    def variance(self, P: tuple[Rows, Vector], h: Vector) -> Number:
-        return linalg.dot(*self._projected(*P, h))
+    def variance(self, P: Factors, h: Vector) -> Number:
+        return dot(*self._projected(*P, h))
 
-    def inflated(self, P: tuple[Rows, Vector], a: Number) -> tuple[Rows, Vector]:
+    def inflated(self, P: Factors, a: Number) -> Factors:
         U, D = P
-        return U, [linalg.times(d, a) for d in D]
+        return U, [times(d, a) for d in D]
 
-    def tolerance(self, P: tuple[Rows, Vector], h: Vector) -> Value | int:
+    def tolerance(self, P: Factors, h: Vector) -> Value | int:
         """None: a sum of D_j f_j^2 is not negative."""
         return 0
 
-    def limit(self, t: Trace, P: tuple[Rows, Vector], floors: list[Fraction | None], ceilings: list[Fraction | None]
-              ) -> tuple[Rows, Vector]:  # fmt: skip
+    def limit(
+        self, t: Trace, P: Factors, floors: list[Fraction | None], ceilings: list[Fraction | None]
+    ) -> Factors:
         """variance_floor and variance_ceiling, on D."""
-        _, D = P
-        for j, (low, high) in enumerate(zip(floors, ceilings, strict=True)):
-            if low is not None:
-                t.flag(D[j] < low, "REGULARIZED")
-                D[j] = select(D[j] < low, t.value(low), D[j])
-            if high is not None:
-                t.flag(D[j] > high, "REGULARIZED")
-                D[j] = select(D[j] > high, t.value(high), D[j])
-        return P
+        return P[0], limited(t, P[1], floors, ceilings)
 
-    def evidence(self, P: tuple[Rows, Vector], after_predict: bool) -> list[Value]:
+    def evidence(self, P: Factors, after_predict: bool) -> list[Value]:
         """Values whose finiteness shows that of all of P.
 
         After an update none are needed beside x: a gain that has met a value that is not finite stays so. After
@@ -163,7 +142,7 @@ class UD:
         """
         return list(P[1]) if after_predict or self.form == "joseph" else []
 
-    def store(self, t: Trace, P: tuple[Rows, Vector], names: list[str], after_predict: bool) -> None:
+    def store(self, t: Trace, P: Factors, names: list[str], after_predict: bool) -> None:
         U, D = P
         for j in range(self.n):
             for i in range(j):
@@ -171,20 +150,33 @@ class UD:
         for j in range(self.n):
             t.store("kf.D", j, t.name(t.value(D[j]), f"d_{names[j]}"))
 
-    def from_factors(self, t: Trace, U: Rows, D: Vector) -> tuple[Rows, Vector]:
+    def from_factors(self, t: Trace, U: Rows, D: Vector) -> Factors:
         return U, D
 
-    def factors(self, P: tuple[Rows, Vector]) -> tuple[Rows, Vector]:
+    def from_entries(self, P: Symmetric) -> Factors:
+        return udu([[P[i, j] for j in range(self.n)] for i in range(self.n)])
+
+    def factors(self, P: Factors) -> Factors:
         return [list(row) for row in P[0]], list(P[1])
 
-    def columns(self, P: tuple[Rows, Vector]) -> list[tuple[Vector, Number]]:
+    def columns(self, P: Factors) -> list[tuple[Vector, Number]]:
         return factor_columns(*P)
 
-    def root(self, P: tuple[Rows, Vector], tolerance: Fraction) -> tuple[list[Vector], list[Value]]:
-        return columns_of(root_of_factors(*P)), []
+    def root(self, t: Trace, P: Factors, tolerance: Fraction, stored: bool, in_loops: bool) -> Array | Columns:
+        return self.root_array(t) if stored and in_loops else Columns(columns_of(root_of_factors(*P)), [])
 
-    def downdated(self, t: Trace, P: tuple[Rows, Vector], c: Vector, s: Number, tolerance: Fraction, sure: bool,
-                  prior: Covariance) -> tuple[tuple[Rows, Vector], Value]:  # fmt: skip
+    def gatherer(
+        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
+    ) -> Gatherer[Factors]:
+        def finish(U: Rows, D: Vector) -> Factors:
+            return self.from_factors(t, U, D)
+
+        if how.in_loops:
+            return FactorsInLoops(t, self.order, Q, noise, how, finish)
+        return GatheredFactors(t, Q, noise, how, finish)
+
+    def downdated(self, t: Trace, P: Factors, c: Vector, s: Number, tolerance: Fraction, sure: bool,
+                  prior: Factors) -> tuple[Factors, Value]:  # fmt: skip
         U, D = [list(row) for row in P[0]], list(P[1])
         smallest = None
         if not sure:
@@ -194,29 +186,24 @@ class UD:
         t.flag(gone, "REGULARIZED")
         return (U, D), failed
 
-    def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
-        return []
+    def indefinite(self, P: Factors, tolerance: Fraction) -> tuple[Factors, list[Value]]:
+        """Never: D is not negative."""
+        return P, []
 
-    # covariance in and out, as loops -------------------------------------------------------------------
+    def solved(self, t: Trace, P: Factors, columns: list[Vector], tolerance: Fraction) -> Rows:
+        dense = self.entries(P)
+        known = [dense[j, j] * tolerance for j in range(self.n)]  # a pivot up to it is a direction without spread
+        return [solved(*P, c, known) for c in columns]
 
-    def get(self, t: Trace, i: Value, j: Value) -> Value:
-        """P_ij for counters i <= j, summed in a loop."""
-        n = self.n
-        if n == 1:
-            return t.element("kf.D", j)
-        total = t.variable("sum", t.element("kf.D", j))
-        with t.when(i < j):
-            total.set(total.get() * t.element("kf.U", strict_start(j) + i))
-        with t.loop("k", j + 1, n) as k:
-            u = t.element("kf.U", strict_start(k) + i) * t.element("kf.D", k)
-            total.set(total.get() + u * t.element("kf.U", strict_start(k) + j))
-        return total.get()
 
-    def put(self, t: Trace, P: Array, factors: Array) -> None:
-        """Store the factors (D on the diagonal, U above, upper triangle column by column) of a covariance."""
-        with t.loop("j", 0, self.n) as j:
-            if self.n > 1:
-                with t.loop("i", 0, j) as i:
-                    t.store("kf.U", strict_start(j) + i, factors[upper_start(j) + i])
-            t.store("kf.D", j, factors[upper_start(j) + j])
-
+def limited(t: Trace, D: Vector, floors: list[Fraction | None], ceilings: list[Fraction | None]) -> Vector:
+    """D (n,) between its limits, flagged REGULARIZED."""
+    out = list(D)
+    for j, (low, high) in enumerate(zip(floors, ceilings, strict=True)):
+        if low is not None:
+            t.flag(out[j] < low, "REGULARIZED")
+            out[j] = select(out[j] < low, t.value(low), out[j])
+        if high is not None:
+            t.flag(out[j] > high, "REGULARIZED")
+            out[j] = select(out[j] > high, t.value(high), out[j])
+    return out

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.linalg import Rows, Vector
-from kfgen.filters.algebra.numbers import assume_nonnegative, is_one, is_positive, is_zero, require_nonnegative
+from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_one, is_positive, is_zero, require_nonnegative
+from kfgen.filters.covariance.kernels.function import Kernels, Passed, integer
 from kfgen.filters.covariance.kernels.points import remove
 from kfgen.filters.covariance.kernels.updates import absorb
-from kfgen.filters.covariance.looped import Given, Kernels, Space, fill, integer
+from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import NEGATIVE, Additive, Factored
 from kfgen.filters.frame.runs import Put, put
 from kfgen.filters.frame.triangles import strict, strict_start, upper_start
@@ -20,7 +21,7 @@ from kfgen.ir.trace import Array, Trace, Value
 class Absorber:
     """U and D in the local arrays `factor` (strict upper triangle by columns) and `diagonal`, and what they absorb.
 
-    names: of the states in the inner order. table: the name of a table in the emitted file. tables: see Layout.
+    names: of the states in the inner order. table: the name of a table in the emitted file. tables: see Form.
     """
 
     def __init__(self, names: list[str], kernels: Kernels, table: tuple[str, str]) -> None:
@@ -96,7 +97,7 @@ class Absorber:
         """The two columns, of which `count` leading entries may differ from zero. sure: D is known to be positive."""
         U, D = self.arrays(space)
         sure = sure and not self.kernels.several
-        arrays: list[Given] = [(each.name, 0) for each in (U, D, self.columns(space))]
+        arrays: list[Passed] = [(each.name, 0) for each in (U, D, self.columns(space))]
         space.t.call(absorb(self.kernels, self.n, sure), [*arrays, *weights, count])
 
     def remove(self, space: Space, c: Array, s: Value, tolerance: Fraction, known: Fraction | None) -> Value:
@@ -104,15 +105,15 @@ class Absorber:
         the variance is a direction without spread."""
         t = space.t
         left = space.array("left", 1)
-        arrays: list[Given] = [(each.name, 0) for each in (*self.arrays(space), c)]
+        arrays: list[Passed] = [(each.name, 0) for each in (*self.arrays(space), c)]
         limits = [] if known is None else [t.value(known)]
         t.call(remove(self.kernels, self.n, known is None), [*arrays, s, *limits, (left.name, 0)])
         rest = t.name(left[0], "left_over")
         t.flag(rest < 0, "REGULARIZED")
         return ~(rest >= -(s * tolerance))
 
-    def learn(self, space: Space, field: str, rate: Fraction, sure: bool, steps: list[tuple[Array, Value]]) -> None:
-        """See Rolled.learn; the field holds the factors as a Kept does."""
+    def learn(self, space: Space, field: str, rate: Fraction, sure: bool, steps: Sequence[tuple[Array, Value]]) -> None:
+        """See loops.motion.Learner; the field holds the factors as a Kept does."""
         n, t = self.n, space.t
         U, D = self.arrays(space)
         w = self.columns(space)
@@ -130,6 +131,20 @@ class Absorber:
             with t.loop("i", 0, j) as i:
                 t.store(field, upper_start(j) + i, U[strict_start(j) + i])
             t.store(field, upper_start(j) + j, D[j])
+
+    def add_spread(
+        self, space: Space, spread: list[tuple[Array, Number]], place: Callable[[Value], Value]
+    ) -> None:
+        """+ sum of v d d^T over some (d, v), d (n,) in the spec's order, two at a time."""
+        t, n, w = space.t, self.n, self.columns(space)
+        for c in range(0, len(spread), 2):
+            pair = spread[c : c + 2]
+            with t.loop("i", 0, n) as i:
+                at = place(i)
+                for side, (array, _) in enumerate(pair):
+                    w[i + side * n] = array[at]
+            weights = [assume_nonnegative(t.value(weight)) for _, weight in pair]
+            self.absorb(space, False, [*weights, t.zero][:2], integer(t, n))
 
     def absorb_columns(self, space: Space, sure: bool, columns: list[tuple[Vector, Value]]) -> None:
         """One or two columns (vector, weight), of which the entries are known one by one."""

@@ -1,0 +1,70 @@
+"""P in the struct: its upper triangle, column by column."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from kfgen.filters.algebra.numbers import select, sqrt
+from kfgen.filters.base import Block
+from kfgen.filters.frame.triangles import upper_size, upper_start
+from kfgen.ir.program import Function
+from kfgen.ir.trace import Array, Trace, Value
+
+
+class FullStore:
+    """The field `P`. The states are in the spec's order."""
+
+    title = "full"
+    reorders = False
+    factored = False
+
+    def __init__(self, n: int) -> None:
+        self.n = n
+        self.order = list(range(n))
+
+    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
+        flat = tuple(P0[i][j] for j in range(self.n) for i in range(j + 1))
+        return [Block("P", len(flat), "covariance, upper triangle column by column", initial=flat)]
+
+    def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
+        return []
+
+    def get(self, t: Trace, i: Value, j: Value) -> Value:
+        """P_ij for counters i <= j."""
+        return t.element("kf.P", upper_start(j) + i)
+
+    def put(self, t: Trace, P: Array, factors: Array) -> None:
+        """Store a covariance (upper triangle column by column) whose factors are known to be positive."""
+        with t.loop("k", 0, upper_size(self.n)) as k:
+            t.store("kf.P", k, P[k])
+
+    def root_array(self, t: Trace, tolerance: Fraction, own: Array | None = None) -> Array:
+        """The columns of the lower root of P, one after another. own: an array in place of the field.
+
+        A pivot up to `tolerance` of its diagonal is a direction without spread.
+        """
+        n = self.n
+
+        def entry(place: Value) -> Value:
+            return t.element("kf.P", place) if own is None else own[place]
+
+        out = t.array(t.unique("root"), n * n)
+        with t.loop("j", 0, n) as j:
+            diagonal = t.name(entry(upper_start(j) + j), "diagonal")
+            pivot = t.variable("pivot", diagonal)
+            with t.loop("k", 0, j) as k:
+                pivot.set(pivot.get() - out[k * n + j] * out[k * n + j])
+            left = t.name(pivot.get(), "left")
+            limit = t.name(diagonal * tolerance, "limit")
+            t.guard(~(left >= -limit), "NOT_POSITIVE")
+            length = t.name(sqrt(select(left > limit, left, 0)), "length")
+            inverse = t.name(select(left > limit, 1 / length, 0), "inverse")
+            out[j * n + j] = length
+            with t.loop("i", j + 1, n) as i:
+                rest = t.variable("rest", entry(upper_start(i) + j))
+                with t.loop("k", 0, j) as k:
+                    rest.set(rest.get() - out[k * n + i] * out[k * n + j])
+                out[j * n + i] = rest.get() * inverse
+            with t.loop("i", 0, j) as i:
+                out[j * n + i] = 0
+        return out

@@ -1,0 +1,1 @@
+"""What the looped forms of the covariance have in common: local arrays, gains in them, columns absorbed."""

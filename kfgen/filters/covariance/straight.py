@@ -1,0 +1,30 @@
+"""What the forms in straight-line code have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
+
+from kfgen.filters.covariance.base import Form
+from kfgen.filters.covariance.motion import Moved
+from kfgen.ir.trace import Trace, Value
+
+
+class StraightLine:
+    """Every number is a value of its own."""
+
+    indexed = False
+    tables: Mapping[str, tuple[int, ...]] = {}
+    order: list[int]
+
+    def straight(self) -> Self:
+        return self
+
+    def mixer(self, forms: Sequence[Form[Any]]) -> None:
+        return None
+
+    def kept(self, t: Trace, x: list[Value], before: list[Value]) -> list[Value]:
+        return x
+
+    def at_rest(self, t: Trace, P: Any) -> Moved:
+        return Moved(t, self.order, [0] * len(self.order))
