@@ -18,13 +18,13 @@ type can carry, so that what differs is the filters' own arithmetic.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kfgen.geometry import part_of
 from kfgen.native.run import Plan, plan
 from kfgen.simulate import simulate
 from kfgen.spec.types import Spec
@@ -234,7 +234,7 @@ class _Scales:
         n = len(self.names)
         self._upper = np.triu_indices(n)
         self.pairs = [f"{self.names[i]}, {self.names[j]}" for i, j in zip(*self._upper, strict=True)]
-        self._periods = ref.model.periods
+        self._parts = [part_of(ref.model.periods.get(i)) for i in range(n)]
         dtype = kf._value.dtype
         floating = dtype.kind == "f"
         self._dtype = dtype if floating else np.dtype(np.float64)
@@ -256,9 +256,7 @@ class _Scales:
     def x_errors(self, x: Array, truth: Array, P: Array) -> Array:
         """Errors [n] in sigma; of a state that is known exactly, relative to its magnitude."""
         self._magnitude = np.maximum(self._magnitude, np.abs(truth))
-        error = x - truth
-        for i, period in self._periods.items():
-            error[i] = math.remainder(error[i], period) if math.isfinite(error[i]) else math.inf
+        error = np.array([part.local(a, b) for part, a, b in zip(self._parts, x, truth, strict=True)])
         beyond = np.maximum(np.abs(error) - self._absolute - self._relative * self._magnitude, 0.0)
         sigma = np.sqrt(np.maximum(np.diag(P), 0.0))
         scale = np.where(sigma > 0, sigma, np.where(self._magnitude > 0, self._magnitude, 1.0))

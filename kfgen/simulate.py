@@ -25,10 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.errors import KfgenError
+from kfgen.geometry import part_of
 from kfgen.logs import Log
 from kfgen.reference.dual import value_of
 from kfgen.reference.linalg import udu
-from kfgen.reference.model import Context, Model, fixed_step, wrap
+from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.process import Process
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import StepError
@@ -168,12 +169,13 @@ class _World:
         R = meter.additive.linearise(x, Reading(meter.additive, z, used, context)).R
         z = z + _draw(R, random)
         for i, component in enumerate(meter.spec.components):
-            if component.period is not None:
-                z[i] = wrap(float(z[i]), self.model.number(component.period))
+            period = None if component.period is None else self.model.number(component.period)
+            z[i] = part_of(period).placed(float(z[i]))
         return z
 
     def _placed(self, x: Array) -> Array:
-        return self.model.wrap(self.model.clip(x))
+        x = self.model.clip(x)
+        return np.array([part_of(self.model.periods.get(i)).placed(float(v)) for i, v in enumerate(x)])
 
 
 def _draw(P: Array, random: Draws) -> Array:

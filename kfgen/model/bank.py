@@ -82,16 +82,10 @@ def build_bank(spec: Spec) -> BankModel:
 
 
 def _combined(models: tuple[Model, ...], mu: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
-    """The mean of the modes' x0; periodic states about that of the largest weight."""
+    """The mean of the modes' x0, about that of the largest weight."""
     heaviest = models[max(range(len(mu)), key=lambda i: (mu[i], -i))]
     out = []
-    for k, period in enumerate(heaviest.periods):
-        base = heaviest.x0[k]
-        shift = Fraction(0)
-        for model, m in zip(models, mu, strict=True):
-            d = model.x0[k] - base
-            if period is not None:
-                d -= (d / period - Fraction(1, 2)).__ceil__() * period
-            shift += m * d
+    for k, (part, base) in enumerate(zip(heaviest.parts, heaviest.x0, strict=True)):
+        shift = sum((m * part.local(model.x0[k], base) for model, m in zip(models, mu, strict=True)), Fraction(0))
         out.append(base + shift)
     return tuple(out)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import sympy
 
 from kfgen.errors import KfgenError, Mistake, Place, SpecError
+from kfgen.geometry import Part, part_of
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
 from kfgen.model.options import INNOVATION, Options, build_options
@@ -46,6 +48,16 @@ class SensorModel:
     def name(self) -> str:
         return self.spec.name
 
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The geometry of each component."""
+        return tuple(part_of(period) for period in self.periods)
+
+    @property
+    def dimension(self) -> int:
+        """Degrees of freedom of an innovation."""
+        return sum(part.dimension for part in self.parts)
+
 
 @dataclass(frozen=True)
 class Model:
@@ -76,6 +88,11 @@ class Model:
     @property
     def states(self) -> tuple[str, ...]:
         return tuple(s.name for s in self.spec.states)
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The geometry of each state."""
+        return tuple(part_of(period) for period in self.periods)
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.errors import KfgenError
+from kfgen.geometry import part_of
 from kfgen.reference import ReferenceFilter, reference
 from kfgen.reference.status import Status
 from kfgen.selftest.track import Track
@@ -74,9 +75,8 @@ def record(spec: Spec, track: Track) -> Record:
 
 
 def _near(ref: ReferenceFilter, coarse: ReferenceFilter, variance: Array) -> bool:
-    error = np.abs(ref.x - coarse.x)
-    for i, period in ref.model.periods.items():
-        error[i] = abs(error[i] - round(error[i] / period) * period)
+    parts = [part_of(ref.model.periods.get(i)) for i in range(len(ref.x))]
+    error = np.abs([part.local(a, b) for part, a, b in zip(parts, ref.x, coarse.x, strict=True)])
     allowed = TOLERANCES["float"] / 8 * np.sqrt(np.maximum(variance, 0.0)) + 1e-6 * np.abs(ref.x)
     apart = np.abs(np.diag(coarse.P) - variance) > TOLERANCES["float"] / 8 * variance + 1e-6 * np.max(variance)
     return not (np.any(error > allowed) or np.any(apart))

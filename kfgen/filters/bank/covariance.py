@@ -7,6 +7,7 @@ from kfgen.filters.bank.mode import Mode
 from kfgen.filters.bank.trace import BankTrace
 from kfgen.filters.base import CONST_KF, KF
 from kfgen.filters.steps.covariance import covariance_argument
+from kfgen.geometry import heaviest
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Value
@@ -93,15 +94,11 @@ class BankCovariance:
             with t.of(mode.scope()):
                 arrays.append(t.array("d", n))
                 x.append([t.element("kf.x", k) for k in range(n)])
-        for k, (name, period) in enumerate(zip(states, self.model.periods, strict=True)):
-            base, weight = x[0][k], mu[0]
-            if period is not None:
-                for own, m in zip(x[1:], mu[1:], strict=True):
-                    base, weight = select(m > weight, own[k], base), select(m > weight, m, weight)
-                t.name(base, f"{name}_base")
-            d = [own[k] - base for own in x]
-            if period is not None:
-                d = [v if v.constant is not None else t.wrap(v, period) for v in d]
+        for k, (name, part) in enumerate(zip(states, self.model.parts, strict=True)):
+            base = x[0][k]
+            if not part.flat:
+                base = t.name(heaviest([own[k] for own in x], mu, select), f"{name}_base")
+            d = [part.local(own[k], base) for own in x]
             shift = sum((m * v for m, v in zip(mu[1:], d[1:], strict=True)), mu[0] * d[0])
             t.name(shift, f"shift_{name}")
             for array, v in zip(arrays, d, strict=True):

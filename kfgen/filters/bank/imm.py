@@ -206,7 +206,7 @@ class Imm:
         with t.of(scope):
             t.section("where it starts from")
             mixture = spread(t, self.model, [part.x for part in parts], w, own)
-            x = [v if p is None else t.wrap(v, p) for v, p in zip(mixture.mean, self.model.periods, strict=True)]
+            x = [part.placed(v) for v, part in zip(mixture.mean, self.model.parts, strict=True)]
             P = mixed(t, parts, w, mixture, own)
             with t.capture() as captured:
                 mode.filter.form.straight().store(t, P, mode.filter.names, after_predict=False)

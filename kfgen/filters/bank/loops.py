@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from kfgen.filters.algebra.linalg import Vector, minus, plus, times
-from kfgen.filters.algebra.numbers import Number, is_zero
-from kfgen.filters.bank.mixing import Joining, heaviest, joining
+from kfgen.filters.algebra.numbers import Number, is_zero, select
+from kfgen.filters.bank.mixing import Joining, joining
 from kfgen.filters.bank.trace import BankTrace, Scope
 from kfgen.filters.covariance.loops.space import Space
 from kfgen.filters.covariance.parts import Mixer
+from kfgen.geometry import Line, heaviest
 from kfgen.ir.trace import Array, Value
 from kfgen.model import Model
 
@@ -74,23 +75,21 @@ def _state(
     columns = [(space.array(f"spread{k}", n), step.weight) for k, step in enumerate(steps)]
 
     def state(k: int | Value) -> None:
-        period = model.periods[k] if isinstance(k, int) else None
+        part = model.parts[k] if isinstance(k, int) else Line()
         values = [source.state(k) for source in sources]
-        base = values[0] if period is None else t.name(_heaviest(values, weights), "base")
-        deltas: Vector = [0 if value is base else value - base for value in values]
-        if period is not None:
-            deltas = [t.wrap(d, period) if isinstance(d, Value) else d for d in deltas]
+        base = values[0] if part.flat else t.name(heaviest(values, weights, select), "base")
+        deltas: Vector = [0 if value is base else part.local(value, base) for value in values]
         mean = deltas[0]
         for (array, _), step, delta in zip(columns, steps, deltas[1:], strict=True):
             e = t.name(t.value(minus(delta, mean)), "apart")
             array[k] = e
             mean = plus(mean, times(step.share, e))
         total = t.value(plus(base, mean))
-        mixed[k] = total if period is None else t.wrap(total, period)
+        mixed[k] = part.placed(total)
 
     start = 0
     for stop in range(n + 1):
-        if stop < n and model.periods[stop] is None:
+        if stop < n and model.parts[stop].flat:
             continue
         if stop - start == 1:
             state(start)
@@ -101,7 +100,3 @@ def _state(
             state(stop)
         start = stop + 1
     return mixed, columns
-
-
-def _heaviest(values: list[Value], weights: list[Number]) -> Value:
-    return values[0] if len(values) == 1 else heaviest(values, weights)

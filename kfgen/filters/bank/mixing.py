@@ -25,6 +25,7 @@ from kfgen.filters.algebra.numbers import (
 from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Straight
+from kfgen.geometry import heaviest
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 
@@ -78,16 +79,15 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
     parts = [i for i in parts if not is_zero(weights[i])]
     base: list[Value] = list(states[parts[0]])
     straight = sorted(parts)
-    for k, period in enumerate(model.periods):
-        if period is not None and len(parts) > 1:
-            base[k] = t.name(heaviest([states[i][k] for i in straight], [weights[i] for i in straight]),
+    for k, part in enumerate(model.parts):
+        if not part.flat and len(parts) > 1:
+            base[k] = t.name(heaviest([states[i][k] for i in straight], [weights[i] for i in straight], select),
                              f"{model.states[k]}_base")  # fmt: skip
     deltas: list[Vector] = []
     for i in parts:
         delta: Vector = []
-        for k, period in enumerate(model.periods):
-            d: Number = 0 if base[k].node is states[i][k].node else states[i][k] - base[k]
-            delta.append(d if is_zero(d) or period is None else t.wrap(d, period))
+        for k, part in enumerate(model.parts):
+            delta.append(0 if base[k].node is states[i][k].node else part.local(states[i][k], base[k]))
         deltas.append(delta)
     mean = deltas[0]
     columns: list[tuple[Vector, Number]] = []
@@ -96,14 +96,6 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
         columns.append((e, step.weight))
         mean = [plus(m, times(step.share, d)) for m, d in zip(mean, e, strict=True)]
     return Spread([t.value(plus(b, m)) for b, m in zip(base, mean, strict=True)], columns)
-
-
-def heaviest(values: list[Value], weights: list[Number]) -> Value:
-    """The value of the largest weight, the first of equals."""
-    value, weight = values[0], weights[0]
-    for v, w in zip(values[1:], weights[1:], strict=True):
-        value, weight = select(w > weight, v, value), select(w > weight, w, weight)
-    return value
 
 
 def mixed(t: Trace, parts: list[Estimate], weights: list[Number], spreads: Spread, own: int) -> Any:

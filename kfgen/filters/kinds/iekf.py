@@ -39,11 +39,10 @@ class Iekf(Ekf):
         for place, (i, m) in enumerate(zip(self.order, list(moved), strict=True)):
             if is_zero(m):
                 continue
-            period = model.periods[i]
-            x[i] = u.x[i] + m
-            if period is not None:
-                x[i] = t.wrap(x[i], period)
-                moved[place] = t.wrap(x[i] - u.x[i], period)
+            part = model.parts[i]
+            x[i] = part.retract(u.x[i], m)
+            if not part.flat:
+                moved[place] = part.local(x[i], u.x[i])
             t.name(x[i], f"{model.states[i]}_iterate")
         linear = u.code.linearise(x)
         y = [t.value(plus(v, dot(h, moved))) for v, h in zip(linear.y, linear.H, strict=True)]

@@ -164,15 +164,15 @@ def residual_uses(model: Model, sensor: SensorModel) -> set[str]:
 def difference(t: Trace, model: Model, sensor: SensorModel, i: int, z: Value, base: Value, x: list[Value]) -> Value:
     """z - base of component i, wrapped, or by its own residual at x."""
     used = residual_uses(model, sensor)
-    residual, period = sensor.residual[i], sensor.periods[i]
+    residual = sensor.residual[i]
     if residual is not None:
         name = sensor.spec.components[i].name
         evaluator = Evaluator(t, model, _duals(t, model, x, {w.name: t.zero for w in sensor.noises}, used))
         evaluator.bind(sympy.Symbol(f"z_{name}"), z)
         evaluator.bind(sympy.Symbol(f"h_{name}"), base)
         return evaluator.value(residual)
-    d = z - base
-    return d if period is None else t.wrap(d, period)
+    difference: Value = sensor.parts[i].local(z, base)
+    return difference
 
 
 def depends(value: Value, prefixes: tuple[str, ...]) -> bool:

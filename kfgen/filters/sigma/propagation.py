@@ -88,7 +88,7 @@ class Propagation:
         """The mean, the covariance, conditions of failure, and the mean's shift from the centre's image."""
         model, n, points, f = self.model, self.n, self.points, self.f
         count = len(points.rows)
-        if points.centre or any(p is not None for p in model.periods):
+        if points.centre or not all(part.flat for part in model.parts):
             base_array = t.array("centre", stride)
             for i in range(stride):
                 base_array[i] = x[i] if i < n else t.zero
@@ -96,7 +96,7 @@ class Propagation:
             base = [t.name(cloud.clipped(t, base_array[i], model.bounds[i]), f"{model.states[i]}_centre")
                     for i in range(n)]  # fmt: skip
         else:
-            base = x  # any base does where nothing is periodic
+            base = x  # any base does
         sums = [t.variable(f"shift_{name}", 0) for name in model.states]
         names = [model.states[i] for i in self.form.order]
         Q = Given([[result.Q[i][j] for j in self.form.order] for i in self.form.order])
@@ -114,10 +114,8 @@ class Propagation:
             t.call(f.function, [*f.arguments(step.dt), ("points", at)])
             rejected = self._rejected(t, array, at, step)
             deviations = []
-            for i, period in enumerate(model.periods):
-                d = cloud.clipped(t, array[at + i], model.bounds[i]) - base[i]
-                if period is not None:
-                    d = t.wrap(d, period)
+            for i, part in enumerate(model.parts):
+                d = part.local(cloud.clipped(t, array[at + i], model.bounds[i]), base[i])
                 if rejected is not None:
                     d = t.select(rejected, t.zero, d)
                 deviations.append(t.name(d, f"dev_{model.states[i]}"))
@@ -189,8 +187,8 @@ class Propagation:
     ) -> None:
         """Store the points, less x; not those of a covariance that a floor or ceiling has changed."""
         first = self.n if self.points.centre else 0
-        offset = [s if is_zero(f - v) or p is not None else s + (v - f)
-                  for s, f, v, p in zip(shift, free, x, self.model.periods, strict=True)]  # fmt: skip
+        offset = [s + (v - f) if part.flat and not is_zero(f - v) else s
+                  for s, f, v, part in zip(shift, free, x, self.model.parts, strict=True)]  # fmt: skip
         for i, s in enumerate(offset):
             if first:
                 t.store("kf.points", i, -s)

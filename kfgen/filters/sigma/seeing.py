@@ -68,7 +68,7 @@ class Seeing:
             return False
         if any(b is not None for b in model.bounds):
             return False
-        if any(p is not None for p in sensor.periods) or any(r is not None for r in sensor.residual):
+        if not all(part.flat for part in sensor.parts) or any(r is not None for r in sensor.residual):
             return False
         t = Trace()
         code = SensorCode(t, model, sensor, list(range(self.n)))

@@ -66,7 +66,7 @@ class Ukf(Ekf):
         """Whether f is linear, so that F P F^T is what points would give."""
         model = self.model
         plain = not self.keeps and not self.carried and self.set.exact and not model.options.rejects
-        if not plain or any(p is not None for p in (*model.periods, *model.bounds)):
+        if not plain or not all(part.flat for part in model.parts) or any(b is not None for b in model.bounds):
             return False
         t = Trace()
         step = process.step_length(t, model)

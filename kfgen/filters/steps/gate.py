@@ -25,7 +25,8 @@ def gate(t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], u
     if len(gates) < len(sensors):
         return
     t.section("gate")
-    beyond = reduce(and_, [v > chi2_threshold(t, p, len(sensors[0].h), used) for p, v in zip(gates, nis, strict=True)])
+    m = sensors[0].dimension
+    beyond = reduce(and_, [v > chi2_threshold(t, p, m, used) for p, v in zip(gates, nis, strict=True)])
     before = [Store("kf.nis", None, smallest(t, nis).node)]
     if not counts_gated(model, sensors):
         t.guard(beyond, "GATED", before=before)

@@ -118,8 +118,8 @@ class SensorCode:
     def _residuals(self, evaluator: Evaluator, predicted: list[Value], named: bool = True) -> Vector:
         t, sensor = self.t, self.sensor
         y: Vector = []
-        for component, p, residual, period in zip(
-            sensor.spec.components, predicted, sensor.residual, sensor.periods, strict=True
+        for component, p, residual, part in zip(
+            sensor.spec.components, predicted, sensor.residual, sensor.parts, strict=True
         ):
             z = t.field(f"z.{component.name}")
             if residual is not None:
@@ -127,9 +127,7 @@ class SensorCode:
                 evaluator.bind(sympy.Symbol(f"h_{component.name}"), p)
                 nu = evaluator.value(residual)
             else:
-                nu = z - (t.name(p, f"h_{component.name}") if named else p)
-                if period is not None:
-                    nu = t.wrap(nu, period)
+                nu = part.local(z, t.name(p, f"h_{component.name}") if named else p)
             y.append(t.name(nu, f"y_{component.name}" if named else f"e_{component.name}"))
         return y
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 
 from kfgen.filters.algebra.numbers import select
 from kfgen.filters.base import KF, Block
@@ -48,7 +47,7 @@ class StateCode:
     def blocks(self) -> list[Block]:
         """The fields of the struct, in order."""
         model = self.model
-        x0 = tuple(_wrapped(v, period) for v, period in zip(model.x0, model.periods, strict=True))
+        x0 = tuple(part.placed(v) for v, part in zip(model.x0, model.parts, strict=True))
         out = [Block("x", self.n, "state", initial=x0)]
         out += self.covariance
         out.append(Block("nis", None, "normalised innovation squared of the last update"))
@@ -72,16 +71,14 @@ class StateCode:
     def confined(self, t: Trace, x: list[Value]) -> list[Value]:
         """x within its bounds, angles wrapped. Spec's order."""
         out = []
-        for value, bounds, period, name in zip(
-            x, self.model.bounds, self.model.periods, self.model.states, strict=True
+        for value, bounds, part, name in zip(
+            x, self.model.bounds, self.model.parts, self.model.states, strict=True
         ):
             if bounds is not None:
                 low, high = t.value(bounds[0]), t.value(bounds[1])
                 value = t.name(value, f"{name}_free") if value.constant is None else value
                 value = select(value < low, low, select(value > high, high, value))
-            if period is not None and value.constant is None:
-                value = t.wrap(value, period)
-            out.append(value)
+            out.append(part.placed(value))
         return out
 
     def initialize(self, t: Trace, sensor: SensorModel, used: list[Value] | None) -> None:
@@ -140,7 +137,7 @@ class StateCode:
         given = [t.element("x", i) for i in range(self.n)]
         for value in given:  # one by one: the sum of large numbers would overflow
             t.guard(~t.finite(value), "NOT_FINITE")
-        x = [v if p is None else t.wrap(v, p) for v, p in zip(given, self.model.periods, strict=True)]
+        x = [part.placed(v) for v, part in zip(given, self.model.parts, strict=True)]
         for path in self.states:
             for i, value in enumerate(x):
                 t.store(path, i, value)
@@ -173,11 +170,3 @@ def _store_runs(t: Trace, block: Block) -> None:
             for position in range(start, stop):
                 t.store(f"kf.{block.name}", position, t.value(values[position]))
         start = stop
-
-
-def _wrapped(value: Fraction, period: Fraction | None) -> Fraction:
-    """value in (-period/2, period/2]."""
-    if period is None:
-        return value
-    turns = (value / period - Fraction(1, 2)).__ceil__()
-    return value - turns * period
