@@ -10,8 +10,8 @@ from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-from kfgen.emit.printer import WIDTH
-from kfgen.emit.view import View
+from kfgen.emit.data import View
+from kfgen.emit.text import WIDTH
 
 _WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
 

@@ -8,9 +8,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from kfgen.emit.printer import WIDTH
+from kfgen.emit.data import View
 from kfgen.emit.render import render_c
-from kfgen.emit.view import View
+from kfgen.emit.text import WIDTH
 from kfgen.fixed.scalar import Fixed
 from kfgen.generate import Generated
 from kfgen.native.header import Header, parse
