@@ -12,6 +12,7 @@ from kfgen.emit.text import WIDTH, about, columns, fill, safe
 from kfgen.filters.base import FilterCode
 from kfgen.ir.nodes import Constants, Table
 from kfgen.scalars import Scalar
+from kfgen.status import ERROR, Status
 
 _REFERENCE_WIDTH = 88
 _INDICES = {
@@ -51,6 +52,18 @@ def indices(prefix: str, states: Iterable[Quantity]) -> tuple[Named, ...]:
 
 def _behind(comment: str, blanks: int) -> str:
     return " " * blanks + f"/* {comment} */" if comment else ""
+
+
+def statuses() -> Iterator[Named]:
+    """The bits of the status, and where the errors begin."""
+    for name, status in Status.__members__.items():
+        if status == ERROR:
+            yield _status("ERROR", ERROR, "errors from here up")
+        yield _status(name, status, status.doc)
+
+
+def _status(name: str, bit: int, doc: str) -> Named:
+    return Named(name, _behind(doc, 1), value=f"0x{bit:03x}u")
 
 
 def state_table(code: FilterCode) -> list[str]:

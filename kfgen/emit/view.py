@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 import sympy
 
 from kfgen.emit import fixed_point, header, struct
-from kfgen.emit.data import Data, Named, ScalarView, SensorView, View
+from kfgen.emit.data import Data, ScalarView, SensorView, View
 from kfgen.emit.fixed_point import FixedPoint
 from kfgen.emit.functions import FunctionMaker
 from kfgen.emit.text import WIDTH, fill, safe
@@ -16,22 +16,6 @@ from kfgen.filters.base import FilterCode
 from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.schedule import LIBRARY_NAMES
 from kfgen.scalars import Scalar
-
-STATUSES = (
-    ("OK", 0x000, ""),
-    ("REGULARIZED", 0x001, "a variance was limited, or taken to zero by round-off"),
-    ("GLITCH_SMALL", 0x002, "an innovation was weighted down"),
-    ("GLITCH_LARGE", 0x004, "an innovation was cut off"),
-    ("ANOMALY", 0x008, "an innovation beyond its variance was taken all the same"),
-    ("GATED", 0x010, "the measurement was refused; nothing but nis has changed"),
-    ("SATURATED", 0x020, "a number was clipped to its range"),
-    ("DT_CLAMPED", 0x040, "dt was outside of its limits and was clamped"),
-    ("POINT_REJECTED", 0x080, "a sigma point was replaced"),
-    ("ERROR", 0x100, "errors from here up"),
-    ("NULL_ARGUMENT", 0x100, "a pointer is NULL"),
-    ("NOT_FINITE", 0x200, "an argument or a value of the model is NaN or infinite"),
-    ("NOT_POSITIVE", 0x400, "a variance or dt is not positive"),
-)
 
 
 def package_version() -> str:
@@ -83,9 +67,7 @@ def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPo
         parameters=header.members(spec.parameters),
         modes=struct.modes(name, code.blocks),
         fields=struct.fields(name, code.blocks, bool(spec.parameters)),
-        statuses=tuple(
-            Named(status, f" /* {doc} */" if doc else "", value=f"0x{bit:03x}u") for status, bit, doc in STATUSES
-        ),
+        statuses=tuple(header.statuses()),
         functions=functions,
         constants=tuple(header.index_tables(code)),
         tables=tuple(header.number_tables(code, scalar, tables)),
