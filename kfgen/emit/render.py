@@ -42,7 +42,7 @@ def _environment() -> Environment:
 
 def render(view: View) -> dict[str, str]:
     """File name -> text."""
-    return {f"{view.name}.{suffix}": render_c(f"filter.{suffix}.j2", v=view) for suffix in ("h", "c")}
+    return {f"{view.name}.{suffix}": render_c(f"c/filter.{suffix}.j2", v=view) for suffix in ("h", "c")}
 
 
 def render_c(template: str, **names: Any) -> str:
