@@ -1,4 +1,4 @@
-"""Spec -> {file name: text}. Pure: the same bytes for the same spec, options and versions."""
+"""From a spec to its C files, and what they cost. Pure: the same bytes for the same spec, options and versions."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from kfgen.budgets import Prediction, exceeded, predict
+from kfgen.emit.data import View
 from kfgen.emit.render import render
-from kfgen.emit.view import View, make_view
+from kfgen.emit.view import make_view
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
 from kfgen.fixed.build import FixedFilter, build_fixed
 from kfgen.fixed.scalar import Fixed
 from kfgen.ir.count import operations
-from kfgen.ir.schedule import RESERVED
+from kfgen.ir.names import RESERVED
 from kfgen.logs import Log
 from kfgen.scalars import SCALARS, Scalar
 from kfgen.spec.types import Spec

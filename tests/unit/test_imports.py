@@ -37,7 +37,7 @@ ALLOWED = {
     "model": SPEC | {"geometry", "ir"},
     "filters": SPEC | {"geometry", "ir", "model", "quantiles", "scalars"},
     "fixed": SPEC | {"emit", "filters", "geometry", "ir", "logs", "model", "scalars"},
-    "emit": {"errors", "filters", "ir", "scalars"},
+    "emit": {"errors", "filters", "ir", "scalars", "status"},
     "budgets": SPEC | {"filters", "ir", "scalars"},
     "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars"},
     # the compiled filter, and what uses it
