@@ -8,21 +8,21 @@ from dataclasses import dataclass, replace
 from kfgen.emit.view import FixedPoint
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
-from kfgen.fixed import tables
-from kfgen.fixed.cells import find_arrays
-from kfgen.fixed.certificate import Certificate, certify, lines
-from kfgen.fixed.formats import Formats, choose
-from kfgen.fixed.lowering import lower
-from kfgen.fixed.pace import Pace
-from kfgen.fixed.probe import Departure, probe, shaken
-from kfgen.fixed.random import Random
-from kfgen.fixed.raw import size_of
-from kfgen.fixed.real import Ranges, RealProgram
-from kfgen.fixed.routines import closure
-from kfgen.fixed.runs import Runner
-from kfgen.fixed.scalar import Fixed
-from kfgen.fixed.unroll import unrolled
-from kfgen.fixed.weather import Weather
+from kfgen.fixed.arithmetic import tables
+from kfgen.fixed.arithmetic.routines import closure
+from kfgen.fixed.arithmetic.scalar import Fixed
+from kfgen.fixed.formats.choose import Formats, choose
+from kfgen.fixed.lowering.raw import size_of
+from kfgen.fixed.lowering.statements import lower
+from kfgen.fixed.program.cells import find_arrays
+from kfgen.fixed.program.unroll import unrolled
+from kfgen.fixed.ranges.generator import Random
+from kfgen.fixed.ranges.pace import Pace
+from kfgen.fixed.ranges.real import Ranges, RealProgram
+from kfgen.fixed.ranges.runs import Runner
+from kfgen.fixed.ranges.weather import Weather
+from kfgen.fixed.trial.certificate import Certificate, certify, lines
+from kfgen.fixed.trial.probe import Departure, probe, shaken
 from kfgen.logs import Log
 
 RUNS = ((1.0, 0.0, 0.5, 10), (2.0, 0.02, -0.5, 1), (1.0, 0.05, 0.0, 4))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.real import Memory, Ranges, RealProgram
+from kfgen.fixed.ranges.real import Memory, Ranges, RealProgram
 
 Columns = Mapping[str, Sequence[float]]
 Watcher = Callable[[int, int, Memory, Callable[[], object]], None]  # makes row k's step of `rows`, and looks at it

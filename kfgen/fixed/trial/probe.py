@@ -9,12 +9,12 @@ from itertools import accumulate
 from typing import Any
 
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.cells import Arrays, Cell
-from kfgen.fixed.certificate import saturates
-from kfgen.fixed.formats import Formats
-from kfgen.fixed.real import Memory, Ranges, RealProgram, Source
-from kfgen.fixed.runs import Columns, blank
-from kfgen.fixed.scalar import Fixed
+from kfgen.fixed.arithmetic.scalar import Fixed
+from kfgen.fixed.formats.choose import Formats
+from kfgen.fixed.program.cells import Arrays, Cell
+from kfgen.fixed.ranges.real import Memory, Ranges, RealProgram, Source
+from kfgen.fixed.ranges.runs import Columns, blank
+from kfgen.fixed.trial.certificate import saturates
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Function
 

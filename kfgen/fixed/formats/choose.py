@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.cells import Arrays, Cell, plain
-from kfgen.fixed.chains import chained
-from kfgen.fixed.pace import Pace
-from kfgen.fixed.real import Ranges
+from kfgen.fixed.program.cells import Arrays, Cell, plain
+from kfgen.fixed.program.chains import chained
+from kfgen.fixed.ranges.pace import Pace
+from kfgen.fixed.ranges.real import Ranges
 from kfgen.ir.nodes import Node
 
 BITS = 30  # of the size of a number inside: sums of two then fit an int32_t

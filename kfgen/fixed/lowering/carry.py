@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kfgen.fixed.cells import Cell, affine
-from kfgen.fixed.chains import Path, stores_to
-from kfgen.fixed.expressions import Expressions
-from kfgen.fixed.formats import BITS, CARRIED
-from kfgen.fixed.raw import LIMIT, Context, Raw, constant, nearest, same
-from kfgen.fixed.unroll import integer, make
+from kfgen.fixed.formats.choose import BITS, CARRIED
+from kfgen.fixed.lowering.expressions import Expressions
+from kfgen.fixed.lowering.raw import LIMIT, Context, Raw, constant, nearest, same
+from kfgen.fixed.program.cells import Cell, affine
+from kfgen.fixed.program.chains import Path, stores_to
+from kfgen.fixed.program.unroll import integer, make
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Function, Let, Statement, Store, walk
 

@@ -10,11 +10,11 @@ from dataclasses import replace
 from fractions import Fraction
 from math import ceil, floor
 
-from kfgen.fixed.cells import affine, array_of, number_of, plain
-from kfgen.fixed.formats import BITS
-from kfgen.fixed.functions import Functions
-from kfgen.fixed.raw import LIMIT, UNSEEN, QTable, Raw, constant, is_variance, power, rounded, size_of
-from kfgen.fixed.unroll import boolean, fold, make
+from kfgen.fixed.formats.choose import BITS
+from kfgen.fixed.lowering.functions import Functions
+from kfgen.fixed.lowering.raw import LIMIT, UNSEEN, QTable, Raw, constant, is_variance, power, rounded, size_of
+from kfgen.fixed.program.cells import affine, array_of, number_of, plain
+from kfgen.fixed.program.unroll import boolean, fold, make
 from kfgen.ir.nodes import Constants, Node, Table
 
 

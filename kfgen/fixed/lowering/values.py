@@ -7,10 +7,22 @@ from dataclasses import replace
 from fractions import Fraction
 from math import floor
 
-from kfgen.fixed.formats import BITS
-from kfgen.fixed.raw import INSIDE, LEAST, LIMIT, Context, Raw, constant, is_variance, nearest, power, same, size_of
-from kfgen.fixed.scalar import FINE
-from kfgen.fixed.unroll import make
+from kfgen.fixed.arithmetic.scalar import FINE
+from kfgen.fixed.formats.choose import BITS
+from kfgen.fixed.lowering.raw import (
+    INSIDE,
+    LEAST,
+    LIMIT,
+    Context,
+    Raw,
+    constant,
+    is_variance,
+    nearest,
+    power,
+    same,
+    size_of,
+)
+from kfgen.fixed.program.unroll import make
 from kfgen.ir.nodes import Node
 
 

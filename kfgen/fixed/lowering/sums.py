@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from kfgen.fixed.products import Products
-from kfgen.fixed.raw import FIRST, INSIDE, LIMIT, Raw, constant, power
-from kfgen.fixed.unroll import make
+from kfgen.fixed.lowering.products import Products
+from kfgen.fixed.lowering.raw import FIRST, INSIDE, LIMIT, Raw, constant, power
+from kfgen.fixed.program.unroll import make
 from kfgen.ir.nodes import Node
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from kfgen.fixed import tables
-from kfgen.fixed.arithmetic import LIMIT, Status, narrow, scale
-from kfgen.fixed.functions_circular import inverse
+from kfgen.fixed.arithmetic import tables
+from kfgen.fixed.arithmetic.circular import inverse
+from kfgen.fixed.arithmetic.operations import LIMIT, Status, narrow, scale
 
 
 def power(x: int) -> tuple[int, int]:

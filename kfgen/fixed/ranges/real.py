@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from kfgen.fixed.cells import Arrays
-from kfgen.fixed.source import Source
+from kfgen.fixed.program.cells import Arrays
+from kfgen.fixed.ranges.source import Source
 from kfgen.ir.nodes import Table
 from kfgen.ir.program import Function
 

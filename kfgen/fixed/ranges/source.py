@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from kfgen.fixed.cells import Cell, array_of, number_of
+from kfgen.fixed.program.cells import Cell, array_of, number_of
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import (
     Assign,
@@ -23,7 +23,7 @@ from kfgen.ir.program import (
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from kfgen.fixed.real import RealProgram
+    from kfgen.fixed.ranges.real import RealProgram
 
 
 def unguarded(node: Node) -> Node:
@@ -177,7 +177,7 @@ class Source:
             self.record(self.cell(s.name, s.index), v, small=s.name == "P")
 
     def cell(self, name: str, index: Node) -> Cell:
-        from kfgen.fixed.cells import affine
+        from kfgen.fixed.program.cells import affine
 
         return self.program.arrays.element(array_of(self.f, name), affine(index)[0])
 

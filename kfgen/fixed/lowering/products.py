@@ -5,10 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from kfgen.fixed.formats import BITS
-from kfgen.fixed.raw import FIRST, INSIDE, LAST, LIMIT, ROOMIER, USEFUL, Raw, constant, interval, power, size_of
-from kfgen.fixed.unroll import make
-from kfgen.fixed.values import Values
+from kfgen.fixed.formats.choose import BITS
+from kfgen.fixed.lowering.raw import (
+    FIRST,
+    INSIDE,
+    LAST,
+    LIMIT,
+    ROOMIER,
+    USEFUL,
+    Raw,
+    constant,
+    interval,
+    power,
+    size_of,
+)
+from kfgen.fixed.lowering.values import Values
+from kfgen.fixed.program.unroll import make
 from kfgen.ir.nodes import Node
 
 

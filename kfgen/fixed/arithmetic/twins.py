@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from kfgen.fixed import arithmetic as basic
-from kfgen.fixed import functions_circular as circular
-from kfgen.fixed import functions_exponential as exponential
+from kfgen.fixed.arithmetic import circular, exponential
+from kfgen.fixed.arithmetic import operations as basic
 
 TWINS: dict[str, Callable[..., int]] = {
     "narrow": basic.narrow,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from kfgen.fixed.formats import BITS
-from kfgen.fixed.raw import LIMIT, QTable, Raw, nearest, same, size_of
-from kfgen.fixed.sums import Sums
-from kfgen.fixed.unroll import make
+from kfgen.fixed.formats.choose import BITS
+from kfgen.fixed.lowering.raw import LIMIT, QTable, Raw, nearest, same, size_of
+from kfgen.fixed.lowering.sums import Sums
+from kfgen.fixed.program.unroll import make
 from kfgen.ir.nodes import Node
 
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}

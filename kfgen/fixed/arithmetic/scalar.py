@@ -6,9 +6,9 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from kfgen.fixed import arithmetic
-from kfgen.fixed.arithmetic import Status
-from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
+from kfgen.fixed.arithmetic import operations as arithmetic
+from kfgen.fixed.arithmetic.operations import Status
+from kfgen.fixed.arithmetic.twins import TWINS, WITHOUT_STATUS
 
 PREFIX = "q_"
 INSIDE = 2**30 - 1

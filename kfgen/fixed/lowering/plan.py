@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 
-from kfgen.fixed.cells import Cell, affine, array_of, number_of
-from kfgen.fixed.expressions import Expressions
-from kfgen.fixed.formats import BITS
-from kfgen.fixed.raw import Context
+from kfgen.fixed.formats.choose import BITS
+from kfgen.fixed.lowering.expressions import Expressions
+from kfgen.fixed.lowering.raw import Context
+from kfgen.fixed.program.cells import Cell, affine, array_of, number_of
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Assign, Let, Statement, Store, roots, walk
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from kfgen.fixed.arithmetic import LIMIT
-from kfgen.fixed.scalar import INSIDE, Fixed
+from kfgen.fixed.arithmetic.operations import LIMIT
+from kfgen.fixed.arithmetic.scalar import INSIDE, Fixed
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Function, roots, walk
 

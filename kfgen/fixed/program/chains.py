@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from kfgen.fixed.cells import Arrays, Cell, affine, array_of
+from kfgen.fixed.program.cells import Arrays, Cell, affine, array_of
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Function, Let, Statement, Store, walk
 

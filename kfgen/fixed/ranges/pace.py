@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from statistics import median
 
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.real import Memory, RealProgram
+from kfgen.fixed.ranges.real import Memory, RealProgram
 
 EVERY = 8  # rows between two looks
 GRAIN = 256.0  # LSBs of a variance that a step has to add, or its rounding is felt

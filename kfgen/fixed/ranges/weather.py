@@ -13,9 +13,9 @@ from kfgen.filters.base import FilterCode
 from kfgen.filters.steps import process
 from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.sensor import SensorCode, total
-from kfgen.fixed.cells import find_arrays
-from kfgen.fixed.random import Random
-from kfgen.fixed.real import HUGE, Memory, Ranges, RealProgram
+from kfgen.fixed.program.cells import find_arrays
+from kfgen.fixed.ranges.generator import Random
+from kfgen.fixed.ranges.real import HUGE, Memory, Ranges, RealProgram
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace

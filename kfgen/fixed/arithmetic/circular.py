@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import isqrt
 from typing import NamedTuple
 
-from kfgen.fixed import tables
-from kfgen.fixed.arithmetic import LIMIT, Status, narrow, scale
+from kfgen.fixed.arithmetic import tables
+from kfgen.fixed.arithmetic.operations import LIMIT, Status, narrow, scale
 
 _WORD = 2**32 - 1
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from math import floor
 
-from kfgen.fixed.cells import Arrays, plain
-from kfgen.fixed.formats import Formats
-from kfgen.fixed.unroll import make
+from kfgen.fixed.formats.choose import Formats
+from kfgen.fixed.program.cells import Arrays, plain
+from kfgen.fixed.program.unroll import make
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import Function
 

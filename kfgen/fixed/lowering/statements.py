@@ -8,15 +8,15 @@ from fractions import Fraction
 from typing import cast
 
 from kfgen.filters.base import Block, FilterCode
-from kfgen.fixed.carry import Carry
-from kfgen.fixed.cells import Cell, affine, array_of, number_of, plain
-from kfgen.fixed.expressions import Expressions
-from kfgen.fixed.formats import Formats
-from kfgen.fixed.plan import Plan, variables
-from kfgen.fixed.raw import DYNAMIC, LIMIT, SPREAD, Context, QTable, Raw, constant, is_variance, nearest
-from kfgen.fixed.scalar import FINE
-from kfgen.fixed.unroll import make
-from kfgen.fixed.values import between
+from kfgen.fixed.arithmetic.scalar import FINE
+from kfgen.fixed.formats.choose import Formats
+from kfgen.fixed.lowering.carry import Carry
+from kfgen.fixed.lowering.expressions import Expressions
+from kfgen.fixed.lowering.plan import Plan, variables
+from kfgen.fixed.lowering.raw import DYNAMIC, LIMIT, SPREAD, Context, QTable, Raw, constant, is_variance, nearest
+from kfgen.fixed.lowering.values import between
+from kfgen.fixed.program.cells import Cell, affine, array_of, number_of, plain
+from kfgen.fixed.program.unroll import make
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
     Argument,
