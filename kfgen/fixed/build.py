@@ -9,21 +9,24 @@ from kfgen.emit.view import FixedPoint
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic import tables
+from kfgen.fixed.arithmetic.rounding import size_of
 from kfgen.fixed.arithmetic.routines import closure
 from kfgen.fixed.arithmetic.scalar import Fixed
-from kfgen.fixed.formats.choose import Formats, choose
-from kfgen.fixed.lowering.raw import size_of
-from kfgen.fixed.lowering.statements import lower
+from kfgen.fixed.formats.choose import choose
+from kfgen.fixed.formats.formats import Formats
+from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
 from kfgen.fixed.program.unroll import unrolled
 from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.pace import Pace
-from kfgen.fixed.ranges.real import Ranges, RealProgram
+from kfgen.fixed.ranges.ranges import Ranges
+from kfgen.fixed.ranges.real import RealProgram
 from kfgen.fixed.ranges.runs import Runner
 from kfgen.fixed.ranges.weather import Weather
 from kfgen.fixed.trial.certificate import Certificate, certify, lines
 from kfgen.fixed.trial.probe import Departure, probe, shaken
 from kfgen.logs import Log
+from kfgen.spec.constants import value
 
 RUNS = ((1.0, 0.0, 0.5, 10), (2.0, 0.02, -0.5, 1), (1.0, 0.05, 0.0, 4))
 """Factor of the noises, share of outliers, correlation of the states that is given now and then, rows per reading."""
@@ -113,7 +116,7 @@ def _judge(program: RealProgram, real: FilterCode, integer: FilterCode, formats:
 
 def _spread(formats: Formats, i: int, n: int) -> tuple[float, float]:
     """The largest and the smallest standard deviation of a state that the runs have met."""
-    cell = formats.arrays.element(("array", "get_covariance", "P"), i * n + i)
+    cell = formats.arrays.variance(i, n)
     return math.sqrt(formats.ranges.largest(cell)), math.sqrt(formats.ranges.smallest(cell))
 
 
@@ -136,15 +139,13 @@ def linear(code: FilterCode) -> bool:
 
 
 def _exponents(code: FilterCode) -> dict[str, int]:
-    from kfgen.spec.constants import value
-
     spec = code.model.spec
     return {name: size_of(value(e.tree, spec)) - 1 for name, e in (spec.fixed.scale or {}).items()}
 
 
 def _units(code: FilterCode, formats: Formats) -> tuple[tuple[str, int], ...]:
     spec = code.model.spec
-    out = [(s.name, formats.arrays.element(("array", "kf.x"), i)) for i, s in enumerate(spec.states)]
+    out = [(s.name, formats.arrays.state(i)) for i, s in enumerate(spec.states)]
     out += [(each.name, ("number", f"u.{each.name}")) for each in spec.inputs]
     out += [(each.name, ("number", f"kf.parameters.{each.name}")) for each in spec.parameters]
     out += [

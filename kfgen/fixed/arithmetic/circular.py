@@ -6,7 +6,8 @@ from math import isqrt
 from typing import NamedTuple
 
 from kfgen.fixed.arithmetic import tables
-from kfgen.fixed.arithmetic.operations import LIMIT, Status, narrow, scale
+from kfgen.fixed.arithmetic.limits import LIMIT
+from kfgen.fixed.arithmetic.operations import Status, narrow, scale
 
 _WORD = 2**32 - 1
 

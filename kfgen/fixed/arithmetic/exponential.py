@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from kfgen.fixed.arithmetic import tables
 from kfgen.fixed.arithmetic.circular import inverse
-from kfgen.fixed.arithmetic.operations import LIMIT, Status, narrow, scale
+from kfgen.fixed.arithmetic.limits import LIMIT
+from kfgen.fixed.arithmetic.operations import Status, narrow, scale
 
 
 def power(x: int) -> tuple[int, int]:

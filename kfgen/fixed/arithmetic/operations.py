@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from math import isqrt
 
-LIMIT = 2**31 - 1
-"""Results lie within -LIMIT and LIMIT, so that each has a negative; arguments may be -LIMIT - 1 too."""
+from kfgen.fixed.arithmetic.limits import LIMIT
+
 LONGEST = 2**48
 """What a term of a sum of 64 bits is cut off at."""
 SATURATED = 0x20

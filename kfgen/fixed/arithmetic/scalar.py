@@ -6,13 +6,11 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from kfgen.fixed.arithmetic import operations as arithmetic
-from kfgen.fixed.arithmetic.operations import Status
+from kfgen.fixed.arithmetic.limits import FINE, INSIDE, LEAST, LIMIT
+from kfgen.fixed.arithmetic.operations import NEAREST, Status, scale
 from kfgen.fixed.arithmetic.twins import TWINS, WITHOUT_STATUS
 
 PREFIX = "q_"
-INSIDE = 2**30 - 1
-FINE = 26  # fraction bits that a probability has inside, as sums of them have
 
 
 class Fixed:
@@ -29,7 +27,7 @@ class Fixed:
     epsilon = Fraction(1, 2**26)
     smallest = Fraction(0)
 
-    def __init__(self, name: str, rounding: str = arithmetic.NEAREST) -> None:
+    def __init__(self, name: str, rounding: str = NEAREST) -> None:
         self.name = name
         self.bits = int(name.partition(".")[2])
         self.probability = Fraction(1, 2 ** max(self.bits, FINE))
@@ -38,7 +36,7 @@ class Fixed:
 
     def literal(self, value: Fraction) -> str:
         assert value.denominator == 1, "a constant of the integer program"
-        return "INT32_MIN" if value == -(2**31) else str(int(value))
+        return "INT32_MIN" if value == LEAST else str(int(value))
 
     def nearest(self, value: Fraction) -> Fraction:
         return value
@@ -55,7 +53,7 @@ class Fixed:
             if op == "q_fma":
                 c, a, b = args
                 assert max(abs(a), abs(b)) <= INSIDE, "factors that were proved to be small are not"
-                return self._proved(c + arithmetic.scale(a * b, data[0], self.rounding))
+                return self._proved(c + scale(a * b, data[0], self.rounding))
             if op == "q_mac":
                 return self._mac(args, data[0])
             if op == "q_fit":
@@ -77,13 +75,13 @@ class Fixed:
         """c + a b / 2^s, clipped."""
         assert max(map(abs, args)) <= INSIDE
         c, a, b = args
-        total = c + arithmetic.scale(a * b, s, self.rounding)
+        total = c + scale(a * b, s, self.rounding)
         if abs(total) > INSIDE:
             self.status.saturate()
         return max(-INSIDE, min(INSIDE, total))
 
     def _proved(self, value: int) -> int:
-        if not -(2**31) <= value < 2**31:
+        if not LEAST <= value <= LIMIT:
             raise OverflowError("a value that was proved to fit does not")
         return value
 
@@ -104,6 +102,6 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "q_min": lambda d, a, b: min(a, b),
     "q_max": lambda d, a, b: max(a, b),
     "q_sign": lambda d, a: (a > 0) - (a < 0),
-    "q_abs": lambda d, a: min(abs(a), 2**31 - 1),
-    "q_count": lambda d, a: min(a, 2**31 - 1),
+    "q_abs": lambda d, a: min(abs(a), LIMIT),
+    "q_count": lambda d, a: min(a, LIMIT),
 }

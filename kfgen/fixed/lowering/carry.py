@@ -9,21 +9,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kfgen.fixed.formats.choose import BITS, CARRIED
+from kfgen.fixed.arithmetic.limits import BITS, LIMIT
+from kfgen.fixed.arithmetic.rounding import nearest
+from kfgen.fixed.formats.carried import CARRIED
 from kfgen.fixed.lowering.expressions import Expressions
-from kfgen.fixed.lowering.raw import LIMIT, Context, Raw, constant, nearest, same
+from kfgen.fixed.lowering.raw import Context, Raw
 from kfgen.fixed.program.cells import Cell, affine
 from kfgen.fixed.program.chains import Path, stores_to
-from kfgen.fixed.program.unroll import integer, make
+from kfgen.fixed.program.nodes import constant, integer, make, same, terms
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Function, Let, Statement, Store, walk
 
 LONG = "long"  # the kind of a node of 64 bits
 SUFFIX = "_long"
 ONE = 1 << CARRIED
-
-
 MINUS = Raw(constant(-ONE * 2), -CARRIED - 1, -ONE * 2, -ONE * 2)
+_TERMS = ("q_gather", "q_stretch")
 
 
 class Carry:
@@ -123,13 +124,13 @@ class Carry:
 
     def _sum(self, node: Node, cell: Cell, e: int) -> Node:
         path = self._path(cell)
-        terms = self.x.terms(node)
-        chain = path.nearest([factors for _, factors in terms])
-        sign, factors = terms.pop(chain)
+        parts = terms(node)
+        chain = path.nearest([factors for _, factors in parts])
+        sign, factors = parts.pop(chain)
         total = self.long(factors[0] if len(factors) == 1 else make("mul", factors), cell)
         if sign < 0:
             total = self._scaled(total, MINUS)
-        for sign, factors in terms:
+        for sign, factors in parts:
             total = self._plus(total, sign, factors, e)
         return total
 
@@ -143,9 +144,9 @@ class Carry:
             return None
         before, after = parts
         whole = self.x.definition(after)
-        if whole.op != "sum" or not any(len(f) == 1 and same(f[0], before) for _, f in self.x.terms(whole)):
+        if whole.op != "sum" or not any(len(f) == 1 and same(f[0], before) for _, f in terms(whole)):
             return None
-        for _, factors in self.x.terms(whole):
+        for _, factors in terms(whole):
             for v in factors if len(factors) == 2 else ():
                 for name, node in self.c.nodes.items() if v.op == "variable" else ():
                     found = self._quotient(node)
@@ -216,6 +217,3 @@ def _by_terms(node: Node, name: str) -> list[Statement]:
         out.append(Let(inner, before))
         node = inner
     return [*reversed(out)]
-
-
-_TERMS = ("q_gather", "q_stretch")

@@ -10,11 +10,12 @@ from dataclasses import replace
 from fractions import Fraction
 from math import ceil, floor
 
-from kfgen.fixed.formats.choose import BITS
+from kfgen.fixed.arithmetic.limits import BITS, LIMIT
+from kfgen.fixed.arithmetic.rounding import power, size_of
 from kfgen.fixed.lowering.functions import Functions
-from kfgen.fixed.lowering.raw import LIMIT, UNSEEN, QTable, Raw, constant, is_variance, power, rounded, size_of
-from kfgen.fixed.program.cells import affine, array_of, number_of, plain
-from kfgen.fixed.program.unroll import boolean, fold, make
+from kfgen.fixed.lowering.raw import UNSEEN, QTable, Raw, at
+from kfgen.fixed.program.cells import is_variance, number_of, plain
+from kfgen.fixed.program.nodes import boolean, constant, fold, make
 from kfgen.ir.nodes import Constants, Node, Table
 
 
@@ -106,9 +107,8 @@ class Expressions(Functions):
                 cell = number_of(c.function, node.data)
                 return self.cell(node, cell, self.outside(node.data))
             case "element":
-                array = array_of(c.function, node.data)
                 place = make(node.op, (self.index(node.args[0]),), node.data)
-                cell = c.arrays.element(array, affine(node.args[0])[0])
+                cell = c.arrays.named(c.function, node.data, node.args[0])
                 if node.data == "kf.mu":
                     return self.probability(place)
                 raw = self.cell(place, cell, plain(node.data) in ("kf.x", "x", "P", "S"))
@@ -116,7 +116,7 @@ class Expressions(Functions):
             case "read":
                 if not node.args:
                     return self.cell(node, ("variable", c.function.name, node.data), False)
-                cell = c.arrays.element(array_of(c.function, node.data), affine(node.args[0])[0])
+                cell = c.arrays.named(c.function, node.data, node.args[0])
                 return self.cell(make(node.op, (self.index(node.args[0]),), node.data), cell, False)
             case "real":
                 return Raw(make("q_count", (self.index(node.args[0]),)), 0, 0, LIMIT)
@@ -139,7 +139,7 @@ class Expressions(Functions):
         found = self.c.lookups.get(source)
         if found is None:
             e = max((size_of(v) for v in source.numbers if v), default=0) - BITS + 1
-            numbers = tuple(rounded(v, e) for v in source.numbers)
+            numbers = at(source.numbers, e)
             found = self.c.lookups[source] = (Constants(numbers, source.name), e)
         constants, e = found
         size = max((abs(int(v)) for v in constants.numbers), default=0)

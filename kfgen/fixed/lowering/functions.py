@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from kfgen.fixed.formats.choose import BITS
-from kfgen.fixed.lowering.raw import LIMIT, QTable, Raw, nearest, same, size_of
+from kfgen.fixed.arithmetic.limits import BITS, LIMIT
+from kfgen.fixed.arithmetic.rounding import nearest, size_of
+from kfgen.fixed.lowering.raw import QTable, Raw
 from kfgen.fixed.lowering.sums import Sums
-from kfgen.fixed.program.unroll import make
+from kfgen.fixed.program.nodes import make, same, terms
 from kfgen.ir.nodes import Node
 
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
@@ -90,7 +91,7 @@ class Functions(Sums):
         if node.op != "sum":
             return None
         found = []
-        for sign, factors in self.terms(node):
+        for sign, factors in terms(node):
             if sign < 0 or len(factors) != 2 or not same(*factors):
                 return None
             found.append(factors[0])

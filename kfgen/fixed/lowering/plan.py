@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
-from kfgen.fixed.formats.choose import BITS
+from kfgen.fixed.arithmetic.limits import BITS
 from kfgen.fixed.lowering.expressions import Expressions
 from kfgen.fixed.lowering.raw import Context
-from kfgen.fixed.program.cells import Cell, affine, array_of, number_of
+from kfgen.fixed.program.cells import Cell, number_of
+from kfgen.fixed.program.nodes import terms, variables
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Assign, Let, Statement, Store, roots, walk
 
@@ -80,7 +81,7 @@ class Plan:
         if node.op in ("element", "read"):
             if not node.args:
                 return self.exponent(("variable", self.c.function.name, node.data))
-            return self.exponent(self.c.arrays.element(array_of(self.c.function, node.data), affine(node.args[0])[0]))
+            return self.exponent(self.c.arrays.named(self.c.function, node.data, node.args[0]))
         if node.op == "neg":
             return self._of(node.args[0])
         return self.c.formats.node(node)
@@ -88,8 +89,8 @@ class Plan:
     def _visit(self, node: Node, e: int | None) -> None:
         if node.op in ("sum", "mul", "add", "sub"):
             e = self.c.formats.node(node) if e is None else e
-            terms = [(1, node.args)] if node.op == "mul" else self.x.terms(node)
-            for _, factors in terms:
+            parts = [(1, node.args)] if node.op == "mul" else terms(node)
+            for _, factors in parts:
                 if len(factors) == 1 and factors[0].op == "mul":
                     factors = factors[0].args
                 if len(factors) == 1 and factors[0].op == "variable" and e is not None:
@@ -117,13 +118,3 @@ class Plan:
 
 
 LEAVES = ("element", "field", "read", "variable")
-
-
-def variables(s: Statement) -> Iterator[str]:
-    """The names of the locals that a statement reads, as often as it does."""
-    stack = list(roots(s))
-    while stack:
-        node = stack.pop()
-        if node.op == "variable":
-            yield node.data
-        stack += node.args

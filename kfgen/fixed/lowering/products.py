@@ -1,36 +1,28 @@
-"""Products, quotients and sums of two in integers."""
+"""Products, and sums of two, in integers."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
 
-from kfgen.fixed.formats.choose import BITS
-from kfgen.fixed.lowering.raw import (
-    FIRST,
-    INSIDE,
-    LAST,
-    LIMIT,
-    ROOMIER,
-    USEFUL,
-    Raw,
-    constant,
-    interval,
-    power,
-    size_of,
-)
-from kfgen.fixed.lowering.values import Values
-from kfgen.fixed.program.unroll import make
+from kfgen.fixed.arithmetic.limits import BITS, INSIDE, LIMIT
+from kfgen.fixed.arithmetic.rounding import power, size_of
+from kfgen.fixed.lowering.quotients import Quotients
+from kfgen.fixed.lowering.raw import FIRST, LAST, ROOMIER, USEFUL, Raw, interval
+from kfgen.fixed.program.nodes import constant, make, terms
 from kfgen.ir.nodes import Node
 
 
-class Products(Values):
-    """Lowers products and quotients."""
+class Products(Quotients):
+    """Lowers products."""
+
+    def constant_first(self, factors: tuple[Node, ...]) -> tuple[Node, Node]:
+        """Two factors, a constant before what is none."""
+        a, b = map(self.folded, factors)
+        return (b, a) if b.constant is not None else (a, b)
 
     def product(self, node: Node, e: int | None) -> Raw:
-        a, b = map(self.folded, node.args)
-        if b.constant is not None:
-            a, b = b, a
+        a, b = self.constant_first(node.args)
         if a.constant is not None and not self._inverse_of(b):
             exact = self.literal(a.constant, None)
             if abs(int(exact.node.constant or 0)) == 1:
@@ -76,24 +68,6 @@ class Products(Values):
         if not 0 <= s <= 62:
             return self._shifted_product(ra, rb, e)
         return self._mul(ra, rb, s, e, most)
-
-    def guarded(self, quotient: Raw, condition: Node | None) -> Raw:
-        """0 where the condition does not hold."""
-        if condition is None:
-            return quotient
-        return Raw(make("select", (condition, quotient.node, constant(0))), quotient.e, -LIMIT, LIMIT)
-
-    def ratio_of(self, node: Node) -> tuple[Raw, Raw, Node | None] | None:
-        """Of a quotient that is not kept, numerator, denominator and condition."""
-        return self.c.ratios.get(node.data) if node.op == "variable" else None
-
-    def _ratio(self, ratio: tuple[Raw, Raw, Node | None], b: Raw, e: int) -> Raw:
-        """A quotient times b, at e."""
-        num, den, _ = ratio
-        s = num.e + b.e - den.e - e
-        if b.node.constant is not None and s > 62:
-            return self._divided(num, den, e)
-        return Raw(make("q_ratio", (num.node, b.node, den.node), (max(-62, min(62, s)),)), e)
 
     def _mul(self, a: Raw, b: Raw, s: int, e: int, most: int | None = None) -> Raw:
         a, b, s, most = self._within(a, b, s, most)
@@ -197,9 +171,7 @@ class Products(Values):
             case "neg":
                 return self.digits(node.args[0])
             case "mul":
-                a, b = map(self.folded, node.args)
-                if b.constant is not None:
-                    a, b = b, a
+                a, b = self.constant_first(node.args)
                 if self._special(a, b):
                     return None
                 if a.constant is not None:
@@ -208,7 +180,7 @@ class Products(Values):
                 return self.value(a).e + self.value(b).e + USEFUL
             case "sum" | "add" | "sub":
                 found = []
-                for _, f in self.terms(node):
+                for _, f in terms(node):
                     if f[0].constant is None or len(f) == 2:
                         found.append(self.digits(f[0] if len(f) == 1 else make("mul", f)))
                 return None if not found or None in found else min(v for v in found if v is not None)
@@ -232,53 +204,3 @@ class Products(Values):
             bound *= 1 if f.constant is None else abs(f.constant)
         needed = size_of(bound) - BITS if bound else e
         return needed if e < needed <= natural + ROOMIER else e
-
-    def _special(self, *factors: Node) -> bool:
-        """Whether a product is made by a division."""
-        return any(self._inverse_of(f) is not None or self.ratio_of(f) is not None for f in factors)
-
-    def _inverse_of(self, node: Node) -> tuple[Raw, Node | None] | None:
-        if node.op == "div" and node.args[0].constant == 1 and self.c.formats.more:
-            den = self.value(node.args[1])
-            return (den, None) if den.low <= 0 else None
-        return self.c.inverses.get(node.data) if node.op == "variable" else None
-
-    def inverse(self, node: Node, e: int | None) -> Raw:
-        """A reciprocal that is not kept, used by itself."""
-        den, condition = self.c.inverses[node.data]
-        if e is None:
-            e = self.c.formats.node(self.c.known[f"1/{node.data}"]) or -den.e - BITS
-        one = self._divided(Raw(constant(1), 0, 1, 1), den, e)
-        if condition is None:
-            return one
-        return Raw(make("select", (condition, one.node, constant(0))), e, -LIMIT, LIMIT)
-
-    def quotient(self, node: Node, e: int | None) -> Raw:
-        fine = e is None
-        if e is None:
-            e = self.natural(node)
-        a, b = node.args
-        den = self.value(b)
-        if fine and e is not None and a.constant is None:
-            e = max(e, self.value(a).e - den.e - BITS - 3)
-        if e is None:
-            e = (0 if a.constant is not None else self.value(a).e) - den.e - BITS // 2
-        return self._divided(self.value(a), den, e)
-
-    def _divided(self, a: Raw, b: Raw, e: int) -> Raw:
-        """a / b at e."""
-        s = a.e - b.e - e
-        raw = a.node.constant
-        if raw is not None and raw > 0 and (int(raw) & (int(raw) - 1)) == 0:
-            bits = s + int(raw).bit_length() - 1
-            if 0 <= bits <= 62:
-                node = make("q_reciprocal", (b.node,), (bits,))
-                if b.low > 0:
-                    return Raw(node, e, 0, min(LIMIT, (1 << bits) // b.low + 1))
-                return Raw(node, e, -LIMIT if b.low < 0 else 0)
-        if s > 62:
-            a = self.at(a, a.e - (s - 62))
-            s = 62
-        elif s < -62:
-            return Raw(constant(0), e, 0, 0)
-        return Raw(make("q_div", (a.node, b.node), (s,)), e)

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import floor
 
-from kfgen.fixed.formats.choose import Formats
-from kfgen.fixed.program.cells import Arrays, plain
-from kfgen.fixed.program.unroll import make
+from kfgen.fixed.arithmetic.limits import LIMIT
+from kfgen.fixed.arithmetic.rounding import rounded
+from kfgen.fixed.formats.formats import Formats
+from kfgen.fixed.program.cells import Arrays
+from kfgen.fixed.program.nodes import same
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import Function
 
-LIMIT = 2**31 - 1
-INSIDE = 2**30 - 1  # what every number inside is clipped to: then a product of two by 2^-30, and a sum of two, fit
-LEAST = -(2**31)
-DYNAMIC = 1024  # a reciprocal whose runs span more than this is made with each quotient
 FIRST = 17  # the least shift of a product that has been proved to fit
-ROOMIER = 3  # bits that a product may lose so that it is proved to fit
-SPREAD = 2.0**12  # times its usual size: a quotient that becomes so large is made with each product that it is in
-UNSEEN = 4  # bits for a choice that no run has made
 LAST = 32  # the largest
+ROOMIER = 3  # bits that a product may lose so that it is proved to fit
+UNSEEN = 4  # bits for a choice that no run has made
 USEFUL = 20  # bits: a product of two full factors has no use for more than 62 less these
 
 
@@ -67,45 +64,21 @@ class QTable:
 
     @property
     def x(self) -> tuple[Fraction, ...]:
-        return tuple(rounded(v, self.e[0]) for v in self.source.x)
+        return at(self.source.x, self.e[0])
 
     def starts(self) -> tuple[Fraction, ...]:
-        return tuple(rounded(v, self.e[0]) for v in self.source.starts())
+        return at(self.source.starts(), self.e[0])
 
     def values(self) -> tuple[Fraction, ...]:
-        return tuple(rounded(v, self.e[1]) for v in self.source.values())
+        return at(self.source.values(), self.e[1])
 
     def slopes(self) -> tuple[Fraction, ...]:
-        return tuple(rounded(v, self.e[2]) for v in self.source.slopes())
+        return at(self.source.slopes(), self.e[2])
 
 
-def rounded(value: Fraction, e: int) -> Fraction:
-    """value / 2^e to the nearest integer that fits."""
-    return Fraction(max(-LIMIT, min(LIMIT, nearest(value, e))))
-
-
-def power(e: int) -> Fraction:
-    return Fraction(2) ** e
-
-
-def nearest(value: Fraction, e: int) -> int:
-    """value / 2^e to the nearest integer, ties upwards."""
-    return floor(value / power(e) + Fraction(1, 2))
-
-
-def size_of(value: Fraction) -> int:
-    """The least k with |value| < 2^k."""
-    magnitude = abs(value)
-    k = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
-    while magnitude >= power(k):
-        k += 1
-    while magnitude < power(k - 1):
-        k -= 1
-    return k
-
-
-def constant(value: int) -> Node:
-    return make("const", (), Fraction(value))
+def at(numbers: Iterable[Fraction], e: int) -> tuple[Fraction, ...]:
+    """Numbers of a table in integers whose LSB is 2^e."""
+    return tuple(Fraction(rounded(v, e)) for v in numbers)
 
 
 def interval(a: Raw, b: Raw, s: int) -> tuple[int, int]:
@@ -116,25 +89,3 @@ def interval(a: Raw, b: Raw, s: int) -> tuple[int, int]:
         ends = [x * y for x in (a.low, a.high) for y in (b.low, b.high)]
     half = 1 << s >> 1
     return (min(ends) + half) >> s, (max(ends) + half) >> s
-
-
-def is_variance(path: str, index: Node) -> bool:
-    """Whether an element of the struct is a variance: what is stored there is never below zero."""
-    if plain(path) == "kf.D":
-        return True
-    if plain(path) != "kf.P" or index.constant is None:
-        return False
-    place, j = int(index.constant), 0
-    while j * (j + 3) // 2 < place:
-        j += 1
-    return j * (j + 3) // 2 == place
-
-
-def same(a: Node, b: Node) -> bool:
-    """Whether two expressions are one by their text."""
-    if a is b:
-        return True
-    return (
-        a.op == b.op and a.data == b.data and len(a.args) == len(b.args)
-        and a.op not in ("read",) and all(same(x, y) for x, y in zip(a.args, b.args, strict=True))
-    )  # fmt: skip

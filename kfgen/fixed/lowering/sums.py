@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from kfgen.fixed.arithmetic.limits import INSIDE, LIMIT
+from kfgen.fixed.arithmetic.rounding import power
 from kfgen.fixed.lowering.products import Products
-from kfgen.fixed.lowering.raw import FIRST, INSIDE, LIMIT, Raw, constant, power
-from kfgen.fixed.program.unroll import make
+from kfgen.fixed.lowering.raw import FIRST, Raw
+from kfgen.fixed.program.nodes import constant, make, terms
 from kfgen.ir.nodes import Node
 
 
@@ -14,17 +16,17 @@ class Sums(Products):
     """Lowers sums."""
 
     def sum(self, node: Node, e: int | None) -> Raw:
-        terms = self.terms(node)
+        parts = terms(node)
         needed = self.natural(node) if e is not None else self.useful(node, None)
         if needed is None:
-            needed = e if e is not None else max(self._guess(f) for _, f in terms)
+            needed = e if e is not None else max(self._guess(f) for _, f in parts)
         least = needed - 2 if e is not None else needed  # a store's own head-room is enough
-        plain = [(sign, f[0]) for sign, f in terms if len(f) == 1 and not is_product(f[0])]
+        plain = [(sign, f[0]) for sign, f in parts if len(f) == 1 and f[0].op != "mul"]
         if e is None:
             needed += any(self.value(f).e == needed + 1 for _, f in plain if f.constant is None)
         if e is None or e < least:
-            e = self._sum_format(terms, plain, needed) if e is None else needed
-        products = [(sign, f) for sign, f in terms if len(f) == 2 or is_product(f[0])]
+            e = self._sum_format(parts, plain, needed) if e is None else needed
+        products = [(sign, f) for sign, f in parts if len(f) == 2 or f[0].op == "mul"]
         whole: list[tuple[int, Raw]] = []
         for sign, f in plain:
             raw = self.at(self.value(f, e if f.constant is not None or f.op in ("sum", "add", "sub") else None), e)
@@ -42,9 +44,9 @@ class Sums(Products):
         assert total is not None
         return total
 
-    def _sum_format(self, terms: list[tuple[int, tuple[Node, ...]]], plain: list[tuple[int, Node]], needed: int) -> int:
+    def _sum_format(self, parts: list[tuple[int, tuple[Node, ...]]], plain: list[tuple[int, Node]], needed: int) -> int:
         """The natural format of a sum: no finer than its terms are, and a difference of what the user gives fits."""
-        if len(plain) < len(terms):
+        if len(plain) < len(parts):
             return needed
         raws = [self.value(f) for _, f in plain if f.constant is None]
         if not raws:
@@ -61,9 +63,7 @@ class Sums(Products):
         """total + sign times a product, at e."""
         if len(factors) == 1:
             factors = factors[0].args
-        a, b = map(self.folded, factors)
-        if b.constant is not None:
-            a, b = b, a
+        a, b = self.constant_first(factors)
         if self._special(a, b):
             product = self._product(a, b, e)
             return self._plus(total, sign, product, e)
@@ -92,7 +92,3 @@ class Sums(Products):
             node = make("q_mac", (self.fit(total).node, ra.node, rb.node), (s,))
             return Raw(node, e, max(total.low + low, -INSIDE), min(total.high + high, INSIDE))
         return self._plus(total, 1, self._mul(ra, rb, s, e, most), e)
-
-
-def is_product(node: Node) -> bool:
-    return node.op == "mul"

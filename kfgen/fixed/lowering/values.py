@@ -5,24 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from math import floor
 
-from kfgen.fixed.arithmetic.scalar import FINE
-from kfgen.fixed.formats.choose import BITS
-from kfgen.fixed.lowering.raw import (
-    INSIDE,
-    LEAST,
-    LIMIT,
-    Context,
-    Raw,
-    constant,
-    is_variance,
-    nearest,
-    power,
-    same,
-    size_of,
-)
-from kfgen.fixed.program.unroll import make
+from kfgen.fixed.arithmetic.limits import BITS, FINE, INSIDE, LEAST, LIMIT
+from kfgen.fixed.arithmetic.rounding import nearest, power, rounded, size_of
+from kfgen.fixed.lowering.raw import Context, Raw
+from kfgen.fixed.program.cells import is_variance
+from kfgen.fixed.program.nodes import constant, make, same, terms
 from kfgen.ir.nodes import Node
 
 
@@ -61,11 +49,11 @@ class Values:
         if s == 0:
             return a
         if a.node.constant is not None:
-            raw = floor(Fraction(a.node.constant) / power(s) + Fraction(1, 2))
+            raw = nearest(a.node.constant, s)
             if abs(raw) <= LIMIT:
                 return Raw(constant(raw), e, raw, raw)
         if s > 0:
-            low, high = (floor(v / power(s) + Fraction(1, 2)) for v in (a.low, a.high))
+            low, high = (nearest(Fraction(v), s) for v in (a.low, a.high))
             return Raw(make("q_shift", (a.node,), (min(s, 62),)), e, low, high)
         if a.size << -s <= LIMIT:
             return Raw(make("mul", (a.node, constant(1 << -s))), e, a.low << -s, a.high << -s)
@@ -97,7 +85,7 @@ class Values:
             e = size_of(value) - BITS + 1
             while (value / power(e)).denominator == 1 and (value / power(e + 1)).denominator == 1:
                 e += 1  # exact with fewer digits
-        raw = max(-LIMIT, min(LIMIT, nearest(value, e)))
+        raw = rounded(value, e)
         return Raw(constant(raw), e, raw, raw)
 
     def negative(self, a: Raw) -> Raw:
@@ -119,15 +107,6 @@ class Values:
         if a.clipped is not None:
             return Raw(a.clipped, a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
         return Raw(make("q_fit", (a.node,)), a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
-
-    def terms(self, node: Node) -> list[tuple[int, tuple[Node, ...]]]:
-        if node.op != "sum":
-            return [(1, (node.args[0],)), (1 if node.op == "add" else -1, (node.args[1],))]
-        out, position = [], 0
-        for sign, count in node.data:
-            out.append((sign, tuple(node.args[position : position + count])))
-            position += count
-        return out
 
     def together(self, nodes: Sequence[Node]) -> list[Raw]:
         """Values in one format: the finest in which all of them fit."""
@@ -174,7 +153,7 @@ class Values:
                 return node.data == "kf.mu" or is_variance(node.data, node.args[0])
             case "sum" | "add":
                 return all(sign > 0 and (self.nonnegative(f[0]) if len(f) == 1 else self._square(*f))
-                           for sign, f in self.terms(node))  # fmt: skip
+                           for sign, f in terms(node))  # fmt: skip
             case "mul":
                 return self._square(*node.args)
             case "div":
@@ -211,7 +190,7 @@ class Values:
             inner = self.definition(whole)
             if inner.op not in ("sum", "add") or not self.nonnegative(whole):
                 continue
-            if any(sign > 0 and len(f) == 1 and same(f[0], part) for sign, f in self.terms(inner)):
+            if any(sign > 0 and len(f) == 1 and same(f[0], part) for sign, f in terms(inner)):
                 e = self.c.locals[whole.data].e
                 if e <= raw.e and raw.size << (raw.e - e) <= INSIDE:  # neither rounded nor clipped when it was added
                     return (1 << max(-raw.e - over.e, 0)) + (1 << BITS)

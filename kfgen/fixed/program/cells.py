@@ -6,12 +6,12 @@ loops go through share a cell with those a stride apart: the elements of one sta
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import gcd
 
+from kfgen.fixed.program.nodes import nodes_of
 from kfgen.ir.nodes import Node
-from kfgen.ir.program import Assign, Call, Declare, Function, Slice, Statement, Store, roots, walk
+from kfgen.ir.program import Assign, Call, Declare, Function, Slice, Store, walk
 
 Cell = tuple[object, ...]
 
@@ -37,6 +37,23 @@ class Arrays:
     def element(self, array: Cell, index: int) -> Cell:
         stride = self.strides.get(array, 0)
         return self.find((*array, index % stride if stride else index))
+
+    def named(self, function: Function, name: str, index: Node) -> Cell:
+        """An element as a function names it; of an index that is not known, one of those it may be."""
+        return self.element(array_of(function, name), affine(index)[0])
+
+    def state(self, i: int) -> Cell:
+        """State i of the filter."""
+        return self.element(("array", "kf.x"), i)
+
+    def variance(self, i: int, n: int) -> Cell:
+        """P_ii of n states, as the user reads it."""
+        return self.element(("array", "get_covariance", "P"), i * n + i)
+
+
+def packed(i: int, j: int) -> int:
+    """The place of P_ij, i <= j, among the columns of an upper triangle."""
+    return j * (j + 1) // 2 + i
 
 
 def array_of(function: Function, name: str) -> Cell:
@@ -75,13 +92,16 @@ def affine(index: Node) -> tuple[int, int]:
             return 0, 1
 
 
-def nodes_of(body: list[Statement]) -> Iterator[Node]:
-    for statement in walk(body):
-        stack = list(roots(statement))
-        while stack:
-            node = stack.pop()
-            yield node
-            stack += node.args
+def is_variance(path: str, index: Node) -> bool:
+    """Whether an element of the struct is a variance: what is stored there is never below zero."""
+    if plain(path) == "kf.D":
+        return True
+    if plain(path) != "kf.P" or index.constant is None:
+        return False
+    place, j = int(index.constant), 0
+    while packed(j, j) < place:
+        j += 1
+    return packed(j, j) == place
 
 
 def find_arrays(functions: list[Function]) -> Arrays:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from kfgen.fixed.program.cells import Arrays, Cell, affine, array_of
+from kfgen.fixed.program.cells import Arrays, Cell
+from kfgen.fixed.program.nodes import terms
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Function, Let, Statement, Store, walk
 
@@ -13,7 +14,7 @@ def stores_to(function: Function, arrays: Arrays, s: Statement) -> Cell | None:
     """The cell that a statement stores, if it is one of an array and the same in every call."""
     if not isinstance(s, Store) or s.index is None or s.index.constant is None:
         return None
-    return arrays.element(array_of(function, s.name), affine(s.index)[0])
+    return arrays.named(function, s.name, s.index)
 
 
 def chained(functions: Iterable[Function], arrays: Arrays, cell: Cell) -> bool:
@@ -50,7 +51,7 @@ class Path:
             case "element":
                 if node.args[0].constant is None:
                     return None
-                found = self.arrays.element(array_of(self.function, node.data), affine(node.args[0])[0])
+                found = self.arrays.named(self.function, node.data, node.args[0])
                 return 0 if found == self.cell else None
             case "variable":
                 inner = self.nodes.get(node.data)
@@ -69,9 +70,9 @@ class Path:
         a, b = factors
         return (a, b) if self.nearest([(a,), (b,)]) == 0 else (b, a)
 
-    def nearest(self, terms: list[tuple[Node, ...]]) -> int:
+    def nearest(self, products: list[tuple[Node, ...]]) -> int:
         """Which of several products leads there first."""
-        depths = [min((d for d in map(self.depth, f) if d is not None), default=1 << 30) for f in terms]
+        depths = [min((d for d in map(self.depth, f) if d is not None), default=1 << 30) for f in products]
         return depths.index(min(depths))
 
     def names(self, node: Node) -> list[str] | None:
@@ -97,9 +98,6 @@ class Path:
         return out
 
     def _term(self, node: Node) -> Node:
-        position, terms = 0, []
-        for _, count in node.data:
-            terms.append(node.args[position : position + count])
-            position += count
-        factors = terms[self.nearest(terms)]
+        products = [factors for _, factors in terms(node)]
+        factors = products[self.nearest(products)]
         return factors[0] if len(factors) == 1 else self.ordered(factors)[0]

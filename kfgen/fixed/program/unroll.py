@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 
+from kfgen.fixed.program.nodes import fold, integer, make, nodes_of
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import (
     Assign,
@@ -21,21 +22,8 @@ from kfgen.ir.program import (
     Slice,
     Statement,
     Store,
-    roots,
     walk,
 )  # fmt: skip
-
-
-def make(op: str, args: tuple[Node, ...] = (), data: object = None, kind: str = "real") -> Node:
-    return Node(op, args, data, kind, 0, False)
-
-
-def integer(value: int) -> Node:
-    return make("const", (), Fraction(value), "int")
-
-
-def boolean(value: bool) -> Node:
-    return make("const", (), Fraction(int(value)), "bool")
 
 
 def unrolled(function: Function, tables: Mapping[str, tuple[int, ...]]) -> Function:
@@ -47,18 +35,14 @@ def unrolled(function: Function, tables: Mapping[str, tuple[int, ...]]) -> Funct
 
 def _touches(loop: For) -> bool:
     """Whether a loop indexes arrays that are not its function's own by a counter."""
-    local = {s.name for s in walk(loop.body) if isinstance(s, Declare)}
-    for s in walk(loop.body):
-        stack = list(roots(s))
-        if isinstance(s, Store) and s.index is not None and s.index.constant is None:
-            return True
-        while stack:
-            node = stack.pop()
-            field = node.op == "element" and node.kind == "real" and node.data not in local
-            if field and node.args[0].constant is None:
-                return True
-            stack += node.args
-    return False
+    inside = list(walk(loop.body))
+    if any(isinstance(s, Store) and s.index is not None and s.index.constant is None for s in inside):
+        return True
+    local = {s.name for s in inside if isinstance(s, Declare)}
+    return any(
+        node.op == "element" and node.kind == "real" and node.data not in local and node.args[0].constant is None
+        for node in nodes_of(loop.body)
+    )
 
 
 class _Unroller:
@@ -146,40 +130,3 @@ class _Unroller:
 def _known(value: Fraction | None) -> int:
     assert value is not None, "a loop over fields has a fixed length"
     return int(value)
-
-
-def fold(op: str, args: tuple[Node, ...], kind: str) -> Node | None:
-    """Integers and truth values that are known."""
-    known = [a.constant for a in args]
-    if op == "select" and known[0] is not None:
-        return args[1] if known[0] else args[2]
-    if op in ("and", "or"):
-        for i in (0, 1):
-            if known[i] is not None:
-                decides = bool(known[i]) == (op == "or")
-                return boolean(op == "or") if decides else args[1 - i]
-        return None
-    if op == "not" and known[0] is not None:
-        return boolean(not known[0])
-    if any(v is None for v in known) or any(a.kind not in ("int", "bool") for a in args):
-        return None
-    a = int(known[0] or 0)
-    if op == "half":
-        return integer(a // 2)
-    if op == "neg":
-        return integer(-a)
-    if len(known) != 2:
-        return None
-    b = int(known[1] or 0)
-    match op:
-        case "add":
-            return integer(a + b)
-        case "sub":
-            return integer(a - b)
-        case "mul":
-            return integer(a * b)
-        case "lt":
-            return boolean(a < b)
-        case "le":
-            return boolean(a <= b)
-    return None

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from statistics import median
 
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.ranges.real import Memory, RealProgram
+from kfgen.fixed.ranges.memory import Memory
+from kfgen.fixed.ranges.real import RealProgram
 
 EVERY = 8  # rows between two looks
 GRAIN = 256.0  # LSBs of a variance that a step has to add, or its rounding is felt
@@ -61,10 +62,7 @@ class Pace:
                 self.moved.setdefault(name, []).append(changes)
 
     def _variances(self, memory: Memory) -> list[float]:
-        other = memory.copy()
-        self.program.run("get_covariance", other)
-        n = len(self.code.model.states)
-        return other.arrays["P"][: n * n : n + 1]
+        return self.program.variances(memory, len(self.code.model.states))
 
     def typical(self) -> list[float]:
         """The variances of the run; none where they were not looked at."""

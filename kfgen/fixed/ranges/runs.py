@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.ranges.real import Memory, Ranges, RealProgram
+from kfgen.fixed.ranges.memory import Memory, blank
+from kfgen.fixed.ranges.ranges import Ranges
+from kfgen.fixed.ranges.real import RealProgram
+from kfgen.spec.types import Sensor
 
 Columns = Mapping[str, Sequence[float]]
 Watcher = Callable[[int, int, Memory, Callable[[], object]], None]  # makes row k's step of `rows`, and looks at it
@@ -17,20 +19,15 @@ GROWN = 2.0**14  # times in them: more than that says no more than that a state 
 EVERY = 16  # rows between two calls of the functions that a run does not need
 
 
-def blank(code: FilterCode) -> Memory:
-    """The filter's fields, and the arguments that its functions may be given, all zero."""
-    memory = Memory()
-    for block in code.blocks:
-        if block.size is None:
-            memory.numbers[f"kf.{block.name}"] = {"real": 0.0, "uint32": 0, "bool": False}[block.kind]
-        else:
-            memory.arrays[f"kf.{block.name}"] = [0.0] * block.size
-    n = len(code.model.states)
-    for f in code.functions:
-        for a in f.arguments:
-            if a.size is not None and not f.private:
-                memory.arrays[a.name] = [0.0] * max(a.size, n)
-    return memory
+def elapsed(log: Columns, k: int) -> float:
+    """The time from the row before to row k [s]; 0 at the first."""
+    return float(log["t"][k]) - float(log["t"][k - 1]) if k else 0.0
+
+
+def readings(log: Columns, sensor: Sensor, k: int) -> list[float]:
+    """What a sensor's components read in row k; NaN where nothing was."""
+    columns = [log.get(f"{sensor.name}.{c.name}") for c in sensor.components]
+    return [math.nan if column is None else float(column[k]) for column in columns]
 
 
 class Runner:
@@ -43,13 +40,7 @@ class Runner:
         self.spec = code.model.spec
         self.names = {f.name for f in code.functions}
         self.run_time = self.spec.dt is not None and self.spec.dt.run_time
-        self.statuses: dict[str, int] = {}
         self.limits: list[float] = []  # of variances: an update that inflates one beyond its own is as if not made
-
-    def call(self, function: str, memory: Memory) -> str:
-        status = self.program.run(function, memory)
-        self.statuses[status] = self.statuses.get(status, 0) + 1
-        return status
 
     def run(self, log: Columns, rows: int, correlation: float = 0.0, every: int = 1,
             watch: Watcher | None = None, start: tuple[Memory, int] | None = None) -> Memory:  # fmt: skip
@@ -62,7 +53,7 @@ class Runner:
         """
         memory, first = (blank(self.code), 0) if start is None else start
         if start is None:
-            self.call("init", memory)
+            self.program.run("init", memory)
         self._look(memory)
         least: list[float] = []  # variances of the rows before the outage
         for k in range(first, rows):
@@ -71,9 +62,9 @@ class Runner:
             self._inputs(memory, log, k)
             if self._step(memory, log, k):
                 if watch is None:
-                    self.call("predict", memory)
+                    self.program.run("predict", memory)
                 else:
-                    watch(k - first, rows - first, memory, lambda: self.call("predict", memory))
+                    watch(k - first, rows - first, memory, lambda: self.program.run("predict", memory))
                 self._look(memory)
             if every > 1 and rows < 2 * k < rows + 2 * OUTAGE and not self._grown(memory, least):
                 continue
@@ -91,7 +82,7 @@ class Runner:
         if "set_covariance" not in self.names:
             return
         n = len(self.code.model.states)
-        self.call("get_covariance", memory)
+        self.program.run("get_covariance", memory)
         P = memory.arrays["P"]
         root = [math.sqrt(max(P[i * n + i], 0.0)) for i in range(n)]
         sign = [1 if i % 2 or correlation > 0 else -1 for i in range(n)]
@@ -99,10 +90,10 @@ class Runner:
             root[i] * root[j] * (1.0 if i == j else abs(correlation) * sign[i] * sign[j])
             for i in range(n) for j in range(n)
         ]  # fmt: skip
-        self.call("set_covariance", memory)
+        self.program.run("set_covariance", memory)
         self._look(memory)
 
-    def _limited(self, memory: Memory, sensor: Any, log: Columns, k: int) -> None:
+    def _limited(self, memory: Memory, sensor: Sensor, log: Columns, k: int) -> None:
         if not self.limits:
             self._update(memory, sensor, log, k)
             return
@@ -118,19 +109,16 @@ class Runner:
         return any(0 < old * GROWN < new for old, new in zip(least, found, strict=bool(least)))
 
     def _variances(self, memory: Memory) -> list[float]:
-        other = memory.copy()
-        if "get_covariance" in self.names:
-            self.program.run("get_covariance", other)
         n = len(self.code.model.states)
-        return other.arrays.get("P", [0.0] * (n * n))[: n * n : n + 1]
+        return self.program.variances(memory, n) if "get_covariance" in self.names else [0.0] * n
 
     def rescale(self, memory: Memory, factors: Sequence[float]) -> None:
         """Multiply the standard deviations of the states, at the same correlations."""
         n = len(factors)
-        self.call("get_covariance", memory)
+        self.program.run("get_covariance", memory)
         P = memory.arrays["P"]
         memory.arrays["P"] = [factors[i] * factors[j] * P[i * n + j] for i in range(n) for j in range(n)]
-        self.call("set_covariance", memory)
+        self.program.run("set_covariance", memory)
 
     def _inputs(self, memory: Memory, log: Columns, k: int) -> None:
         for each in self.spec.inputs:
@@ -142,16 +130,13 @@ class Runner:
     def _step(self, memory: Memory, log: Columns, k: int) -> bool:
         if not self.run_time:
             return True
-        step = float(log["t"][k]) - float(log["t"][k - 1]) if k else 0.0
+        step = elapsed(log, k)
         memory.numbers["dt"] = step
         self.ranges.see(("number", "dt"), step)
         return step != 0
 
-    def _update(self, memory: Memory, sensor: Any, log: Columns, k: int) -> None:
-        values = []
-        for c in sensor.components:
-            column = log.get(f"{sensor.name}.{c.name}")
-            values.append(math.nan if column is None else float(column[k]))
+    def _update(self, memory: Memory, sensor: Sensor, log: Columns, k: int) -> None:
+        values = readings(log, sensor, k)
         there = [not math.isnan(v) for v in values]
         if not any(there):
             return
@@ -164,11 +149,11 @@ class Runner:
             if sensor.partial:
                 other = memory.copy()
                 other.numbers["mask"] = 1 + k % ((1 << len(values)) - 1)
-                self.call(f"{name}_masked", other)
-            self.call(name, memory)
+                self.program.run(f"{name}_masked", other)
+            self.program.run(name, memory)
         elif sensor.partial:
             memory.numbers["mask"] = sum(1 << i for i, known in enumerate(there) if known)
-            self.call(f"{name}_masked", memory)
+            self.program.run(f"{name}_masked", memory)
         self._look(memory)
 
     def _look(self, memory: Memory) -> None:
@@ -187,19 +172,19 @@ class Runner:
         """Covariance and state out and in again, on copies."""
         other = memory.copy()
         if "get_covariance" in self.names:
-            self.call("get_covariance", other)
+            self.program.run("get_covariance", other)
         if "set_covariance" in self.names:
             P = list(other.arrays["P"])
             n = len(self.code.model.states)
             for part in (P, [p if i % (n + 1) == 0 else 0.5 * p for i, p in enumerate(P)]):
                 other.arrays["P"] = list(part)
-                self.call("set_covariance", other)
+                self.program.run("set_covariance", other)
             if "set_sqrt_covariance" in self.names:
-                self.call("get_sqrt_covariance", other)
-                self.call("set_sqrt_covariance", other)
+                self.program.run("get_sqrt_covariance", other)
+                self.program.run("set_sqrt_covariance", other)
         other = memory.copy()
         for name in sorted(self.names):
             if name == "redraw" or (name.startswith("get_") and name not in ("get_covariance", "get_sqrt_covariance")):
-                self.call(name, other)
+                self.program.run(name, other)
         other.arrays["x"] = list(other.arrays["kf.x"])
-        self.call("set_state", other)
+        self.program.run("set_state", other)

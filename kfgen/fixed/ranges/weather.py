@@ -14,13 +14,16 @@ from kfgen.filters.steps import process
 from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.sensor import SensorCode, total
 from kfgen.fixed.program.cells import find_arrays
+from kfgen.fixed.ranges import declared
 from kfgen.fixed.ranges.generator import Random
-from kfgen.fixed.ranges.real import HUGE, Memory, Ranges, RealProgram
+from kfgen.fixed.ranges.memory import Memory
+from kfgen.fixed.ranges.ranges import HUGE, Ranges
+from kfgen.fixed.ranges.real import RealProgram
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace
 from kfgen.model import Model
-from kfgen.spec.constants import value
+from kfgen.model.model import SensorModel
 
 JITTER = 0.1
 DWELL = 30
@@ -85,7 +88,7 @@ class Weather:
         names = [c for s in model.sensors for c in self._names(s)]
         columns: dict[str, list[float]] = {c: [] for c in ("t", *model.inputs, *names)}
         inputs = [self._input(i, random) for i in range(len(model.inputs))]
-        nominal = float(value(self.spec.dt.nominal.tree, self.spec)) if self.spec.dt is not None else 1.0
+        nominal = declared.number(self.spec.dt.nominal, self.spec) if self.spec.dt is not None else 1.0
         now, k, mode, left = 0.0, 0, first, self._dwell(random)
         for k in range(rows):
             if left == 0:
@@ -134,8 +137,8 @@ class Weather:
             out.append([max(self.last[i * self.n + i], 0.0) for i in range(self.n)])
         return out
 
-    def _names(self, sensor: object) -> list[str]:
-        return [f"{sensor.name}.{c.name}" for c in sensor.spec.components]  # type: ignore[attr-defined]
+    def _names(self, sensor: SensorModel) -> list[str]:
+        return [f"{sensor.name}.{c.name}" for c in sensor.spec.components]
 
     def _place(self, memory: Memory, x: Sequence[float], noise: Sequence[float]) -> None:
         placed = []
@@ -146,13 +149,10 @@ class Weather:
 
     def _limits(self, i: int) -> tuple[float, float] | None:
         """What a state stays within: its bounds, or the range that it is declared to have."""
-        bounds, declared = self.model.bounds[i], self.spec.states[i].range
+        bounds, given = self.model.bounds[i], self.spec.states[i].range
         if bounds is not None:
             return float(bounds[0]), float(bounds[1])
-        if declared is None:
-            return None
-        low, high = (float(value(limit.tree, self.spec)) for limit in declared)
-        return low, high
+        return None if given is None else declared.limits(given, self.spec)
 
     def _clamped(self, dt: float) -> float:
         low, high = self.model.dt_limits
@@ -164,7 +164,7 @@ class Weather:
         each = self.spec.inputs[i]
         middle, amplitude = 0.0, 1.0
         if each.range is not None:
-            low, high = (float(value(limit.tree, self.spec)) for limit in each.range)
+            low, high = declared.limits(each.range, self.spec)
             middle, amplitude = (low + high) / 2, (high - low) / 8
         waves = [(25.0 * 10 ** random.random(), 2 * math.pi * random.random()) for _ in range(3)]
         return middle, amplitude, waves

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from kfgen.fixed.arithmetic.operations import LIMIT
-from kfgen.fixed.arithmetic.scalar import INSIDE, Fixed
+from kfgen.fixed.arithmetic.limits import INSIDE, LIMIT
+from kfgen.fixed.arithmetic.scalar import Fixed
+from kfgen.fixed.program.nodes import nodes_of
 from kfgen.ir.nodes import Node
-from kfgen.ir.program import Function, roots, walk
+from kfgen.ir.program import Function
 
 NEAR = 7 / 8
-_PLAIN = frozenset({"add", "sub", "mul", "neg", "q_fma", "q_far"})
+_PLAIN = frozenset({"add", "sub", "mul", "neg", "q_fma"})
 _CLIPPED = frozenset({"q_mac", "q_fit"})
 
 
@@ -42,7 +43,7 @@ def certify(functions: Iterable[Function], peaks: Mapping[int, int]) -> tuple[Ce
     """peaks: id of a node that saturates -> the largest size of its result in the probing run."""
     out = []
     for f in functions:
-        operations = {id(node): node for node in _nodes(f) if node.kind == "real"}.values()
+        operations = {id(node): node for node in nodes_of(f.body) if node.kind == "real"}.values()
         clipping = [node for node in operations if saturates(node)]
         near = sum(peaks.get(id(node), 0) > NEAR * _limit(node) for node in clipping)
         run = not clipping or any(id(node) in peaks for node in clipping)
@@ -64,15 +65,3 @@ def lines(certificates: Iterable[Certificate]) -> tuple[str, ...]:
 
 def _limit(node: Node) -> int:
     return INSIDE if node.op in _CLIPPED else LIMIT
-
-
-def _nodes(f: Function) -> Iterable[Node]:
-    seen: set[int] = set()
-    for s in walk(f.body):
-        stack = list(roots(s))
-        while stack:
-            node = stack.pop()
-            if id(node) not in seen:
-                seen.add(id(node))
-                yield node
-                stack += node.args

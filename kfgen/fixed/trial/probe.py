@@ -6,72 +6,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
-from typing import Any
 
 from kfgen.filters.base import FilterCode
+from kfgen.fixed.arithmetic.limits import LEAST, LIMIT
 from kfgen.fixed.arithmetic.scalar import Fixed
-from kfgen.fixed.formats.choose import Formats
-from kfgen.fixed.program.cells import Arrays, Cell
-from kfgen.fixed.ranges.real import Memory, Ranges, RealProgram, Source
-from kfgen.fixed.ranges.runs import Columns, blank
-from kfgen.fixed.trial.certificate import saturates
-from kfgen.ir.nodes import Node
-from kfgen.ir.program import Function
+from kfgen.fixed.formats.formats import Formats
+from kfgen.fixed.program.cells import Cell
+from kfgen.fixed.ranges.memory import Memory, blank
+from kfgen.fixed.ranges.real import RealProgram
+from kfgen.fixed.ranges.runs import Columns, elapsed, readings
+from kfgen.fixed.trial.integers import IntegerProgram
 
 SHAKEN = 2.0**-11  # of a covariance: what a format of 12 bits would lose in a step
 ERRORS = ("NOT_FINITE", "NOT_POSITIVE")
-
-
-class _IntegerSource(Source):
-    """Integer programs are run as they are; every operation is the scalar's own."""
-
-    def record(self, key: Any, value: str, small: bool = False) -> None:
-        pass
-
-    def quotient(self, node: Node, name: str) -> None:
-        pass
-
-    def value(self, node: Node) -> str:
-        match node.op:
-            case "const" if node.kind == "real":
-                return str(int(node.data))
-            case "lookup":
-                return f"{self.program.numbers(node.data.numbers)}[{self.value(node.args[0])}]"
-        return super().value(node)
-
-    def integral(self, node: Node, args: list[str]) -> str:
-        if node.op == "segment":
-            return self.evaluated(node, args)
-        return super().integral(node, args)
-
-    def operation(self, node: Node, args: list[str]) -> str:
-        infix = {"add": "+", "sub": "-", "mul": "*"}.get(node.op)
-        if infix:
-            return f"({args[0]} {infix} {args[1]})"
-        return f"(-{args[0]})" if node.op == "neg" else self.evaluated(node, args)
-
-    def evaluated(self, node: Node, args: list[str]) -> str:
-        v = self.new(f"E({node.op!r}, {self.program.data(node.data)}, [{', '.join(args)}])")
-        if saturates(node):
-            self.emit(f"if not abs({v}) <= M.get({id(node)}, -1): M[{id(node)}] = abs({v})")
-        return v
-
-
-class IntegerProgram(RealProgram):
-    """The functions of an integer filter on Python integers. peaks: see `certificate.certify`."""
-
-    def __init__(self, functions: list[Function], arrays: Arrays, scalar: Fixed) -> None:
-        self.scalar = scalar
-        self.peaks: dict[int, int] = {}
-        super().__init__(functions, arrays, Ranges(), _IntegerSource, {"E": scalar.evaluate, "M": self.peaks})
-
-    def data(self, data: object) -> str:
-        if data is None or isinstance(data, tuple):
-            return repr(data)
-        return self.bound(data)
-
-    def numbers(self, numbers: tuple[Any, ...]) -> str:
-        return self.bound([int(v) for v in numbers])
 
 
 @dataclass(frozen=True)
@@ -124,7 +71,7 @@ class _Probe:
 
     def raw(self, cell: Cell, value: float) -> int:
         scaled = math.floor(math.ldexp(value, -self.formats.fixed[cell]) + 0.5)
-        return max(-(2**31), min(2**31 - 1, scaled))
+        return max(LEAST, min(LIMIT, scaled))
 
     def give(self, cell: Cell, path: str, value: float) -> None:
         """The same number to both: what the integers can carry."""
@@ -145,14 +92,13 @@ class _Probe:
         for k in range(rows):
             for each in self.spec.inputs:
                 self.give(("number", f"u.{each.name}"), f"u.{each.name}", float(log[each.name][k]))
-            step = float(log["t"][k]) - float(log["t"][k - 1]) if run_time and k else 0.0
+            step = elapsed(log, k) if run_time else 0.0
             if run_time:
                 self.give(("number", "dt"), "dt", step)
             if not run_time or step != 0:
                 self.call("predict")
             for sensor in self.spec.measurements:
-                columns = [log.get(f"{sensor.name}.{c.name}") for c in sensor.components]
-                values = [math.nan if c is None else float(c[k]) for c in columns]
+                values = readings(log, sensor, k)
                 if any(map(math.isnan, values)):
                     continue
                 for c, v in zip(sensor.components, values, strict=True):
@@ -174,7 +120,7 @@ class _Probe:
         return math.ldexp(self.b.arrays["kf.x"][i], self._lsb(i))
 
     def _lsb(self, i: int) -> int:
-        return self.formats.fixed[self.formats.arrays.element(("array", "kf.x"), i)]
+        return self.formats.fixed[self.formats.arrays.state(i)]
 
     def _others(self) -> None:
         """What the run has not needed, once, in integers only."""
