@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.formats.carried import carry
 from kfgen.fixed.formats.covariance import covariances
@@ -16,15 +14,15 @@ from kfgen.fixed.ranges.ranges import Ranges
 MORE = 2  # bits of head-room where gains depend on the data, so that no run shows their largest values
 
 
-def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, scale: Mapping[str, int] | None,
-           linear: bool, noise: list[list[float]], pace: Pace) -> Formats:  # fmt: skip
+def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, linear: bool,
+           noise: list[list[float]], pace: Pace) -> Formats:  # fmt: skip
     """The formats of the interface and of the covariance; all others follow from the ranges.
 
-    scale: exponents of the states' units, where given. linear: the covariance does not depend on the data.
-    noise: what a step adds to each variance (modes, n). pace: what the steps of a run changed.
+    linear: the covariance does not depend on the data. noise: what a step adds to each variance (modes, n).
+    pace: what the steps of a run changed.
     """
     formats = Formats(arrays, ranges, bits, 0 if linear else MORE)
-    Interface(code, formats, scale or {}).choose()
+    Interface(code, formats).choose()
     covariances(code, formats, noise)
     carry(code, formats, pace)
     return formats

@@ -6,39 +6,42 @@ From declared ranges, so that the range fits with bits to spare, or from the run
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic.limits import OUTSIDE
+from kfgen.fixed.arithmetic.rounding import size_of
 from kfgen.fixed.formats.formats import HEADROOM, Formats, Quantity, above, exponent
 from kfgen.fixed.program.cells import Cell
 from kfgen.fixed.ranges.declared import limits
 from kfgen.model.model import SensorModel
+from kfgen.spec.constants import value
 from kfgen.spec.types import Range
 
 SPARE = 3  # bits above a declared range, which a filter may overshoot
 
 
 class Interface:
-    """Chooses the formats of one filter's interface. scale: exponents of the states' units, where given."""
+    """Chooses the formats of one filter's interface."""
 
-    def __init__(self, code: FilterCode, formats: Formats, scale: Mapping[str, int]) -> None:
+    def __init__(self, code: FilterCode, formats: Formats) -> None:
         self.code = code
         self.f = formats
         self.model = code.model
         self.spec = code.model.spec
-        self.scale = scale
+        scale = self.spec.fixed.scale or {}
+        self.scale = {name: size_of(value(e.tree, self.spec)) - 1 for name, e in scale.items()}
+        """State -> exponent of the unit that it is given."""
 
     def choose(self) -> None:
         f, spec, n = self.f, self.spec, len(self.model.states)
         x = [self._state(i) for i in range(n)]
         for each in spec.inputs:
             self._quantity(("number", f"u.{each.name}"), each.name, self._limit(each.range), 2)
-        for name, value in self.model.parameters:
+        for name, number in self.model.parameters:
             given = next(p for p in spec.parameters if p.name == name)
             cell = ("number", f"kf.parameters.{name}")
-            f.ranges.see(cell, float(value))
-            self._quantity(cell, name, max(self._limit(given.range), abs(float(value))), 4)
+            f.ranges.see(cell, float(number))
+            self._quantity(cell, name, max(self._limit(given.range), abs(float(number))), 4)
         if spec.dt is not None and spec.dt.run_time:
             high = self.model.dt_limits[1]
             f.ranges.see(("number", "dt"), float(high or 0))
