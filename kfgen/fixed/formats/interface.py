@@ -28,9 +28,8 @@ class Interface:
         self.f = formats
         self.model = code.model
         self.spec = code.model.spec
-        scale = self.spec.fixed.scale or {}
-        self.scale = {name: size_of(value(e.tree, self.spec)) - 1 for name, e in scale.items()}
-        """State -> exponent of the unit that it is given."""
+        given = self.spec.fixed.scale or {}  # state -> its unit, of which the exponent is taken
+        self.scale = {name: size_of(value(e.tree, self.spec)) - 1 for name, e in given.items()}
 
     def choose(self) -> None:
         f, spec, n = self.f, self.spec, len(self.model.states)
@@ -55,6 +54,11 @@ class Interface:
         for name in ("nis", "log_likelihood"):
             f.fixed["number", f"kf.{name}"] = one
         f.fixed["number", "kf.t"] = -12
+        self._arguments(x, z)
+
+    def _arguments(self, x: list[int], z: dict[str, list[int]]) -> None:
+        """Of the arrays that functions take or give. x, z: exponents of the states, and of each sensor's components."""
+        f, n = self.f, len(x)
         for i in range(n):
             self._argument("set_state", "x", i, x[i])
             for j in range(n):

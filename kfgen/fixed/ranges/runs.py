@@ -1,4 +1,4 @@
-"""The real program over logs: nominal ones, and bad weather."""
+"""The real program over a log, row by row: its predictions, its updates, and what is called beside them."""
 
 from __future__ import annotations
 
