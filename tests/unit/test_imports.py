@@ -60,7 +60,8 @@ ALLOWED = {
 """Part of kfgen -> the other parts it may import; `kfgen` itself (its version, a lazy name) is looked through."""
 
 FLOORS = {
-    "filters": ["base", "algebra", "frame", "covariance", "steps", "kinds", "sigma", "bank", "order", "choice", "build"],
+    "filters": ["base", "algebra", "frame", "covariance", "steps", "kinds", "sigma", "bank", "order", "choice",
+                "build"],
     "filters.covariance": ["noise", "kept", "parts", "base", "motion", "kernels", "gather", "loops", "straight", "ud",
                            "full", "sqrt"],
 }  # fmt: skip
