@@ -64,6 +64,7 @@ FLOORS = {
                 "build"],
     "filters.covariance": ["noise", "kept", "parts", "base", "motion", "kernels", "gather", "loops", "straight", "ud",
                            "full", "sqrt"],
+    "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "build"],
 }  # fmt: skip
 """Part or room -> its files and rooms, the lowest first: each imports only what stands before it."""
 

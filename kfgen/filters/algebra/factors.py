@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 
+from kfgen.filters.algebra import swept
 from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, times, zeros
 from kfgen.filters.algebra.numbers import (
     Number,
@@ -17,6 +18,7 @@ from kfgen.filters.algebra.numbers import (
     select,
     sqrt,
 )  # fmt: skip
+from kfgen.filters.algebra.sweep import Matrix, Unrolled
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.ir.trace import Value
 
@@ -137,37 +139,22 @@ def factor_columns(U: Rows, D: Vector) -> list[tuple[Vector, Number]]:
 
 
 def indefinite(P: Symmetric, tolerance: Fraction) -> list[Value]:
-    """Conditions under which a pivot of P is negative beyond rounding."""
+    """Conditions under which a pivot of P is negative by more than rounding leaves."""
     n = P.n
     failures: list[Value] = []
-    rest = [[P[i, j] for j in range(n)] for i in range(n)]
-    for j in range(n):
-        pivot = rest[j][j]
-        if is_zero(pivot):
-            continue
-        limit = P[j, j] * (8 * tolerance)
-        failures.append(~(pivot >= -limit))
-        inverse = select(pivot > limit, 1 / pivot, 0)
-        for i in range(j + 1, n):
-            u = rest[j][i] * inverse
-            for k in range(i, n):
-                rest[i][k] = rest[i][k] - u * rest[j][k]
+    dense: Rows = [[P[i, j] for j in range(n)] for i in range(n)]
+    rest = Matrix([list(row) for row in dense])
+    swept.indefinite(Unrolled(), n, Matrix(dense), rest, 8 * tolerance, failures.append)
     return failures
 
 
 def solved(U: Rows, D: Vector, c: Vector, smallest: Vector) -> Vector:
     """(U D U^T)^-1 c; an entry is 0 where D is not above `smallest`."""
-    n = len(D)
+
+    def inverse(j: int) -> Number:
+        some, plain = reciprocal(assume_nonnegative(D[j]))
+        return plain if is_zero(smallest[j]) else select(some & (D[j] > smallest[j]), 1 / D[j], 0)
+
     v: Vector = list(c)
-    for j in reversed(range(n)):
-        for i in range(j):
-            v[i] = minus(v[i], times(U[i][j], v[j]))
-    inverse = []
-    for d, low in zip(D, smallest, strict=True):
-        some, reciprocal_d = reciprocal(assume_nonnegative(d))
-        inverse.append(reciprocal_d if is_zero(low) else select(some & (d > low), 1 / d, 0))
-    v = [times(x, r) for x, r in zip(v, inverse, strict=True)]
-    for j in range(n):
-        for i in range(j):
-            v[j] = minus(v[j], times(U[i][j], v[i]))
+    swept.solve(Unrolled(), len(D), Matrix(U), v, inverse)
     return v

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, plus, times
+from kfgen.filters.algebra.linalg import Rows, Vector, dot, times
 from kfgen.filters.algebra.numbers import (
     Number,
     assume_nonnegative,
@@ -15,6 +15,8 @@ from kfgen.filters.algebra.numbers import (
     reciprocal,
     select,
 )  # fmt: skip
+from kfgen.filters.algebra.sweep import Matrix, Unrolled
+from kfgen.filters.algebra.swept import remove
 
 
 @dataclass(frozen=True)
@@ -80,33 +82,9 @@ def downdate(
     whether r came out negative by less and was taken as 0. A pivot that is not above `smallest` is a direction
     without spread: what c has there is round-off.
     """
-    n = len(D)
-    v: Vector = list(c)  # U^-1 c = D f
-    for j in reversed(range(n)):
-        for i in range(j):
-            v[i] = minus(v[i], times(U[i][j], v[j]))
-    if smallest is not None:
-        v = [select(d > low, x, 0) for x, d, low in zip(v, D, smallest, strict=True)]
-    f = [times(x, 1 / d if is_positive(d) else reciprocal(d)[1]) for x, d in zip(v, D, strict=True)]
-    r = s - dot(f, v)
-    failed = ~(r >= -(s * tolerance))
-    gone = r < 0
-    before = assume_nonnegative(select(gone, 0, r))
-    k: Vector = [0] * n
-    for j in range(n):
-        if is_zero(v[j]):
-            continue
-        after = before + f[j] * v[j]
-        some, inverse = reciprocal(assume_nonnegative(after))
-        b = times(v[j], inverse)
-        for i in range(j):
-            old = U[i][j]
-            U[i][j] = minus(old, times(f[j], k[i]))
-            k[i] = plus(k[i], times(b, U[i][j]))
-        k[j] = b
-        D[j] = assume_nonnegative(D[j] * select(some, before * inverse, 1))
-        before = after
-    return failed, gone
+    known = None if smallest is None else lambda j: ~(D[j] > smallest[j])
+    r = remove(Unrolled(), len(D), Matrix(U), D, list(c), s, known)
+    return ~(r >= -(s * tolerance)), r < 0
 
 
 def _gain(D: Number, f: Number, weighted: Number, before: Number) -> tuple[Number, Number, Number]:

@@ -9,8 +9,8 @@ from kfgen.filters.algebra.linalg import Rows, Vector, plus, times
 from kfgen.filters.algebra.numbers import assume_nonnegative, assume_positive
 from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
+from kfgen.filters.algebra.triangles import upper, upper_start
 from kfgen.filters.base import Block
-from kfgen.filters.frame.triangles import upper, upper_start
 from kfgen.ir.trace import Trace, Value
 
 

@@ -7,10 +7,10 @@ from fractions import Fraction
 from typing import Any
 
 from kfgen.filters.algebra.numbers import select
+from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.kept import Kept
-from kfgen.filters.frame.triangles import upper_start
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from kfgen.filters.algebra.linalg import Rows, Vector, plus, times
 from kfgen.filters.algebra.numbers import Number, is_zero
+from kfgen.filters.algebra.triangles import upper, upper_start
 from kfgen.filters.covariance.full.terms import ArrayEntries
 from kfgen.filters.covariance.kernels.function import Kernels
 from kfgen.filters.covariance.kernels.points import pivots
@@ -13,7 +14,6 @@ from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Gathering, Weight
 from kfgen.filters.frame.runs import put
-from kfgen.filters.frame.triangles import upper, upper_start
 from kfgen.ir.trace import Array, Trace, Value
 
 

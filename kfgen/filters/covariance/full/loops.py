@@ -10,6 +10,7 @@ from fractions import Fraction
 from kfgen.filters.algebra.linalg import Rows, Vector, dot, plus, times
 from kfgen.filters.algebra.numbers import Number, is_one, is_zero, select, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric
+from kfgen.filters.algebra.triangles import upper, upper_size, upper_start
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.full.gather import LoopedEntries, add_noise, indefinite
 from kfgen.filters.covariance.full.store import FullStore
@@ -22,7 +23,6 @@ from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Gathering, Part, Scalar
 from kfgen.filters.frame.runs import put
-from kfgen.filters.frame.triangles import upper, upper_size, upper_start
 from kfgen.ir.trace import Array, Trace, Value
 
 

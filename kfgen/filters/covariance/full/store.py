@@ -5,8 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.filters.algebra.numbers import select, sqrt
+from kfgen.filters.algebra.triangles import upper_size, upper_start
 from kfgen.filters.base import Block
-from kfgen.filters.frame.triangles import upper_size, upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 

@@ -9,6 +9,7 @@ from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, quotients, ti
 from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, is_positive, is_zero, select, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
+from kfgen.filters.algebra.triangles import upper
 from kfgen.filters.covariance.full.store import FullStore
 from kfgen.filters.covariance.gather import GatheredEntries
 from kfgen.filters.covariance.loops.partly import EntriesInLoops
@@ -16,7 +17,6 @@ from kfgen.filters.covariance.motion import VectorGain
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Scalar
 from kfgen.filters.covariance.straight import StraightLine
-from kfgen.filters.frame.triangles import upper
 from kfgen.ir.trace import Array, Trace, Value
 
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 from kfgen.filters.algebra.linalg import minus, times
 from kfgen.filters.algebra.numbers import Number
+from kfgen.filters.algebra.triangles import upper, upper_size, upper_start
 from kfgen.filters.covariance.kernels.function import Kernels, Passed, integer
 from kfgen.filters.covariance.kernels.rows import put_row
 from kfgen.filters.covariance.loops.space import Space
 from kfgen.filters.frame.runs import Put
-from kfgen.filters.frame.triangles import upper, upper_size, upper_start
 from kfgen.ir.trace import Array, Value
 
 PENDING = 4  # measurements that are taken together, in one pass over P

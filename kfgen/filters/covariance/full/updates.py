@@ -8,12 +8,12 @@ from fractions import Fraction
 from kfgen.filters.algebra.linalg import Vector, dot, minus, plus, times
 from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, is_constant, is_one, is_positive, is_zero, reciprocal, select
+from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.covariance.full.terms import PENDING, ArrayEntries, Term
 from kfgen.filters.covariance.kernels.function import Kernels, integer
 from kfgen.filters.covariance.kernels.rows import add_terms, put_row, take_row
 from kfgen.filters.covariance.loops.motion import ArrayGain, Displacement, array_of_gain, changed_gain
 from kfgen.filters.covariance.parts import GainChange, Scalar
-from kfgen.filters.frame.triangles import upper_start
 from kfgen.ir.trace import Array, Trace, Value
 
 

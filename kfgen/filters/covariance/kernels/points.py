@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from kfgen.filters.algebra import swept
 from kfgen.filters.algebra.numbers import select, sqrt
+from kfgen.filters.algebra.sweep import InLoops, PackedStrict, PackedUpper
+from kfgen.filters.algebra.triangles import strict_start
 from kfgen.filters.covariance.kernels.function import Given, Kernels, array_argument, number_argument
-from kfgen.filters.frame.triangles import strict_start, upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Trace, Value
 
@@ -19,50 +21,17 @@ def _known(t: Trace, U: Given, D: Given, n: int, j: Value) -> Value:
     return t.name(~(d > variance.get() * t.field("tolerance")), "known")
 
 
-def _backwards(t: Trace, U: Given, c: Given, n: int) -> None:
-    """c <- U^-1 c."""
-    with t.loop("j", 0, n, down=True) as j:
-        v = t.name(c[j], "v")
-        with t.loop("i", 0, j) as i:
-            c[i] = c[i] - U[strict_start(j) + i] * v
-
-
 def _factors(n: int, constant: bool) -> list[tuple[str, int, bool]]:
     return [("factor", n * (n - 1) // 2, constant), ("diagonal", n, constant), ("c", n, False)]
 
 
 def remove(kernels: Kernels, n: int, sure: bool) -> Function:
-    """U D U^T -= c c^T / s (see `measurement.downdate`). sure: no direction without spread is to be left alone."""
+    """U D U^T -= c c^T / s (see `algebra.swept.remove`). sure: no direction without spread is to be left alone."""
 
     def body(t: Trace) -> None:
         U, D, c = (Given(t, name) for name in ("factor", "diagonal", "c"))
-        _backwards(t, U, c, n)
-        share, gain = t.array("share", n), t.array("gain", n)
-        left = t.variable("rest", t.field("s"))
-        with t.loop("j", 0, n) as j:
-            v = t.name(c[j] if sure else select(_known(t, U, D, n, j), 0, c[j]), "v")
-            d = t.name(D[j], "d")
-            f = t.name(v * select(d > t.smallest, 1 / d, 0), "f")
-            c[j] = v
-            share[j] = f
-            left.set(left.get() - f * v)
-        Given(t, "left")[0] = left.get()
-        before = t.variable("before", select(left.get() < 0, 0, left.get()))
-        with t.loop("j", 0, n) as j:
-            f, v = t.name(share[j], "f"), t.name(c[j], "v")
-            after = t.name(before.get() + f * v, "after")
-            some = t.name(after > t.smallest, "some")
-            inverse = t.name(select(some, 1 / after, 0), "inverse")
-            b = t.name(v * inverse, "b")
-            D[j] = D[j] * select(some, before.get() * inverse, 1)
-            with t.loop("i", 0, j) as i:
-                place = strict_start(j) + i
-                k = t.name(gain[i], "k_i")
-                u = t.name(U[place] - f * k, "u")
-                U[place] = u
-                gain[i] = k + b * u
-            gain[j] = b
-            before.set(after)
+        known = None if sure else lambda j: _known(t, U, D, n, j)
+        Given(t, "left")[0] = swept.remove(InLoops(t), n, PackedStrict(U), D, c, t.field("s"), known)
 
     arguments = [array_argument(name, size) for name, size, _ in _factors(n, False)]
     arguments += [number_argument("s")] + [number_argument("tolerance")] * (not sure) + [array_argument("left", 1)]
@@ -112,18 +81,18 @@ def remove_root(kernels: Kernels, n: int) -> Function:
 
 
 def solve(kernels: Kernels, n: int) -> Function:
-    """c <- (U D U^T)^-1 c."""
+    """c <- (U D U^T)^-1 c (see `algebra.swept.solve`)."""
 
     def body(t: Trace) -> None:
         U, D, c = (Given(t, name) for name in ("factor", "diagonal", "c"))
-        _backwards(t, U, c, n)
-        with t.loop("j", 0, n) as j:
+
+        def inverse(j: Value) -> Value:
             known = _known(t, U, D, n, j)
             d = t.name(D[j], "d_j")
-            total = t.variable("total", c[j] * select((d > t.smallest) & ~known, 1 / d, 0))
-            with t.loop("i", 0, j) as i:
-                total.set(total.get() - U[strict_start(j) + i] * c[i])
-            c[j] = total.get()
+            value: Value = select((d > t.smallest) & ~known, 1 / d, 0)
+            return value
+
+        swept.solve(InLoops(t), n, PackedStrict(U), c, inverse)
 
     arguments = [array_argument(name, size, constant) for name, size, constant in _factors(n, True)]
     arguments.append(number_argument("tolerance"))
@@ -140,16 +109,11 @@ def pivots(kernels: Kernels, n: int) -> Function:
         with t.loop("k", 0, n * (n + 1) // 2) as k:
             rest[k] = P[k]
         failed = t.variable("failed", 0)
-        with t.loop("j", 0, n) as j:
-            pivot = t.name(rest[upper_start(j) + j], "pivot")
-            limit = t.name(P[upper_start(j) + j] * t.field("tolerance"), "limit")
-            failed.set(select(~(pivot >= -limit), 1, failed.get()))
-            inverse = t.name(select(pivot > limit, 1 / pivot, 0), "inverse")
-            with t.loop("k", j + 1, n) as k:
-                u = t.name(rest[upper_start(k) + j] * inverse, "u")
-                with t.loop("i", j + 1, k + 1) as i:
-                    place = upper_start(k) + i
-                    rest[place] = rest[place] - u * rest[upper_start(i) + j]
+
+        def found(negative: Value) -> None:
+            failed.set(select(negative, 1, failed.get()))
+
+        swept.indefinite(InLoops(t), n, PackedUpper(P), PackedUpper(rest), t.field("tolerance"), found)
         Given(t, "told")[0] = failed.get()
 
     arguments = [array_argument("P", n * (n + 1) // 2, constant=True), number_argument("tolerance"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.covariance.kernels.function import (
     Given,
     Kernels,
@@ -10,7 +11,6 @@ from kfgen.filters.covariance.kernels.function import (
     counter_argument,
     number_argument,
 )
-from kfgen.filters.frame.triangles import upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Trace
 

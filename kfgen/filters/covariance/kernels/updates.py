@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kfgen.filters.algebra.numbers import select, sqrt
+from kfgen.filters.algebra.triangles import strict_start
 from kfgen.filters.covariance.kernels.function import (
     Given,
     Kernels,
@@ -12,7 +13,6 @@ from kfgen.filters.covariance.kernels.function import (
     number_argument,
     select_counter,
 )
-from kfgen.filters.frame.triangles import strict_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value, Variable
 

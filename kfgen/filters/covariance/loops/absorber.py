@@ -8,13 +8,13 @@ from fractions import Fraction
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_one, is_positive, is_zero, require_nonnegative
+from kfgen.filters.algebra.triangles import strict, strict_start, upper_start
 from kfgen.filters.covariance.kernels.function import Kernels, Passed, integer
 from kfgen.filters.covariance.kernels.points import remove
 from kfgen.filters.covariance.kernels.updates import absorb
 from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import NEGATIVE, Additive, Factored
 from kfgen.filters.frame.runs import Put, put
-from kfgen.filters.frame.triangles import strict, strict_start, upper_start
 from kfgen.ir.trace import Array, Trace, Value
 
 

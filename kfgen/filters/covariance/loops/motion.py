@@ -8,11 +8,11 @@ from fractions import Fraction
 
 from kfgen.filters.algebra.linalg import Vector, dot, plus, times
 from kfgen.filters.algebra.numbers import Number, is_positive, is_zero, select
+from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.covariance.kept import Kept
 from kfgen.filters.covariance.loops.space import Space
 from kfgen.filters.covariance.parts import GainChange, Place
 from kfgen.filters.frame import guards
-from kfgen.filters.frame.triangles import upper_start
 from kfgen.ir.trace import Array, Trace, Value
 
 Learner = Callable[["Displacement", str, Fraction, bool], None]

@@ -10,10 +10,10 @@ from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_nonnegative
 from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
+from kfgen.filters.algebra.triangles import strict_size, upper_start
 from kfgen.filters.covariance.base import P
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Gathering, Weight
-from kfgen.filters.frame.triangles import strict_size, upper_start
 from kfgen.ir.trace import Array, Trace, Value
 
 

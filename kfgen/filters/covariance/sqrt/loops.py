@@ -17,6 +17,7 @@ from kfgen.filters.algebra.numbers import (
     sqrt,
 )  # fmt: skip
 from kfgen.filters.algebra.symmetric import Symmetric
+from kfgen.filters.algebra.triangles import strict_start
 from kfgen.filters.covariance.kernels.function import Passed, integer
 from kfgen.filters.covariance.kernels.points import remove_root
 from kfgen.filters.covariance.kernels.updates import carlson
@@ -31,7 +32,6 @@ from kfgen.filters.covariance.sqrt.root import ArrayRoot
 from kfgen.filters.covariance.sqrt.store import SqrtStore
 from kfgen.filters.covariance.sqrt.straight import StraightSqrt
 from kfgen.filters.frame.runs import Put
-from kfgen.filters.frame.triangles import strict_start
 from kfgen.ir.trace import Array, Trace, Value
 
 

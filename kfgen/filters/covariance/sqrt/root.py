@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from kfgen.filters.algebra.triangles import strict, strict_start
 from kfgen.filters.covariance.loops.space import Space
 from kfgen.filters.covariance.sqrt.store import SqrtStore
-from kfgen.filters.frame.triangles import strict, strict_start
 from kfgen.ir.trace import Value
 
 

@@ -9,9 +9,9 @@ from fractions import Fraction
 
 from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.numbers import constant_root, select, sqrt
+from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.kernels.function import integer
-from kfgen.filters.frame.triangles import upper_start
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value

@@ -10,6 +10,7 @@ from fractions import Fraction
 from kfgen.filters.algebra.linalg import Rows, Vector, times
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_positive, is_zero
 from kfgen.filters.algebra.symmetric import Symmetric
+from kfgen.filters.algebra.triangles import strict, strict_size, strict_start
 from kfgen.filters.covariance.kernels.function import Passed, integer
 from kfgen.filters.covariance.kernels.points import solve
 from kfgen.filters.covariance.kernels.updates import bierman
@@ -30,7 +31,6 @@ from kfgen.filters.covariance.parts import Gatherer, Gathering, Part, Scalar
 from kfgen.filters.covariance.ud.store import UDStore
 from kfgen.filters.covariance.ud.straight import StraightUD, limited
 from kfgen.filters.frame.runs import Put
-from kfgen.filters.frame.triangles import strict, strict_size, strict_start
 from kfgen.ir.trace import Array, Trace, Value
 
 

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.numbers import assume_nonnegative, sqrt
+from kfgen.filters.algebra.triangles import strict_size, strict_start, upper_start
 from kfgen.filters.base import Block
-from kfgen.filters.frame.triangles import strict_size, strict_start, upper_start
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 

@@ -10,6 +10,7 @@ from kfgen.filters.algebra.measurement import Measurement, bierman, downdate
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_one, is_zero, require_nonnegative, select
 from kfgen.filters.algebra.rank_one import rank_one, unit_columns
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
+from kfgen.filters.algebra.triangles import strict
 from kfgen.filters.covariance.gather import GatheredFactors
 from kfgen.filters.covariance.loops.partly import FactorsInLoops
 from kfgen.filters.covariance.motion import VectorGain
@@ -17,7 +18,6 @@ from kfgen.filters.covariance.noise import NEGATIVE, Additive
 from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Scalar
 from kfgen.filters.covariance.straight import StraightLine
 from kfgen.filters.covariance.ud.store import UDStore
-from kfgen.filters.frame.triangles import strict
 from kfgen.ir.trace import Array, Trace, Value
 
 Factors = tuple[Rows, Vector]
