@@ -119,10 +119,9 @@ class Weather:
                 self.program.run(f"see_{mode}_{i}", memory)
                 flat = memory.arrays["out.R"]
                 noise = draw([flat[r * m : r * m + m] for r in range(m)], reading)
-                for name, z, e, period in zip(self._names(sensor), memory.arrays["out.z"], noise, sensor.periods,
-                                              strict=True):  # fmt: skip
-                    z += e
-                    columns[name].append(z if period is None else math.remainder(z, float(period)))
+                for name, z, e, part in zip(self._names(sensor), memory.arrays["out.z"], noise, sensor.parts,
+                                            strict=True):  # fmt: skip
+                    columns[name].append(part.placed(z + e))
         return columns, rows
 
     def _dwell(self, random: Random) -> int:
@@ -142,9 +141,8 @@ class Weather:
 
     def _place(self, memory: Memory, x: Sequence[float], noise: Sequence[float]) -> None:
         placed = []
-        for a, e, limits, period in zip(x, noise, self.limits, self.model.periods, strict=True):
-            v = a + e if limits is None else min(max(a + e, limits[0]), limits[1])
-            placed.append(v if period is None else math.remainder(v, float(period)))
+        for a, e, limits, part in zip(x, noise, self.limits, self.model.parts, strict=True):
+            placed.append(part.placed(a + e if limits is None else min(max(a + e, limits[0]), limits[1])))
         memory.arrays["kf.x"] = placed
 
     def _limits(self, i: int) -> tuple[float, float] | None:

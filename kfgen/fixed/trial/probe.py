@@ -144,10 +144,7 @@ class _Probe:
             variances = [self.a.arrays["P"][i * n + i] for i in range(n)]
         worst = (0, 0.0)
         for i in range(n):
-            error = abs(self.a.arrays["kf.x"][i] - self.value(i))
-            period = self.code.model.periods[i]
-            if period is not None:
-                error = abs(math.remainder(error, float(period)))
+            error = abs(self.code.model.parts[i].local(self.a.arrays["kf.x"][i], self.value(i)))
             error = max(0.0, error - math.ldexp(4.0, self._lsb(i)))
             sigma = math.sqrt(max(variances[i], 0.0))
             ratio = error / sigma if sigma > 1e-9 * (1e-300 + abs(self.a.arrays["kf.x"][i])) else 0.0
