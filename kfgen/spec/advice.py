@@ -5,7 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.errors import Mistake
-from kfgen.spec.constants import NotConstant, NoValue, environment_of, less, value
+from kfgen.spec.constants import NotConstant, environment_of, value
+from kfgen.spec.operations import NoValue, less
 from kfgen.spec.types import Spec
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from kfgen.errors import Mistake, Place, SpecError
 from kfgen.spec.advice import warnings as _warnings
-from kfgen.spec.build import Builder
+from kfgen.spec.builders import Builder
 from kfgen.spec.names import SCALARS, check_identifiers, is_scalar
 from kfgen.spec.nodes import Mapping, kind_of
 from kfgen.spec.problems import Problems, short

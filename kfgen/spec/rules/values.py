@@ -5,8 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import pairwise
 
-from kfgen.spec.constants import NotConstant, NoValue, Value, apply, less, truth, value
+from kfgen.spec.constants import NotConstant, truth, value
 from kfgen.spec.expressions import MAX_EXPONENT
+from kfgen.spec.operations import NoValue, Value, apply, less
 from kfgen.spec.rules.facts import Facts, Model, show
 from kfgen.spec.tree import Call, Name, Number, Tree
 from kfgen.spec.types import Filter, Range, Sensor
