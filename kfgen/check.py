@@ -19,12 +19,12 @@ type can carry, so that what differs is the filters' own arithmetic.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kfgen.interface import Array, Filter
 from kfgen.native.run import Plan, plan
 from kfgen.simulate import simulate
 from kfgen.spec.types import Spec
@@ -33,8 +33,6 @@ from kfgen.status import ERROR, Status, describe
 if TYPE_CHECKING:
     from kfgen.native.filter import NativeFilter
     from kfgen.reference import ReferenceFilter
-
-Array = NDArray[np.float64]
 
 STEPS = 400
 SEED = 1
@@ -152,7 +150,7 @@ def compare(
                 coarse.displace(scales.rounded)
             calls += 1
             if (ours ^ theirs) & ~Status.REGULARIZED:  # where a pivot is zero depends on the factorisation
-                text = f"{call[0]} of step {row + 1}: {describe(ours)}, reference {describe(theirs)}"
+                text = f"{call.sensor or 'predict'} of step {row + 1}: {describe(ours)}, reference {describe(theirs)}"
                 differences.append(text)
                 errors_differ |= ours >= ERROR or theirs >= ERROR
                 _follow(ref, kf, coarse)
@@ -170,7 +168,7 @@ def compare(
     )  # fmt: skip
 
 
-def _follow(ref: ReferenceFilter, *others: NativeFilter | ReferenceFilter) -> None:
+def _follow(ref: ReferenceFilter, *others: Filter) -> None:
     """Give other filters the estimate of the reference. All modes of a bank go on from the combined one, those of the
     reference too; mu is the reference's."""
     x = ref.x
@@ -180,49 +178,54 @@ def _follow(ref: ReferenceFilter, *others: NativeFilter | ReferenceFilter) -> No
         if P is not None:
             each.set_covariance(P)
         if ref.spec.imm is not None:
-            each.mu = ref.mu  # type: ignore[misc]
+            each.mu = ref.mu
 
 
-# a function's name ("predict" or a sensor), and its keywords
-Call = tuple[str, dict[str, object]]
+@dataclass(frozen=True)
+class Call:
+    """An update of a sensor with z [m], or without a sensor a predict; u [nu], dt in s and mask where they are used."""
+
+    sensor: str | None = None
+    z: Array = field(default_factory=lambda: np.empty(0))
+    u: Array | None = None
+    dt: float | None = None
+    mask: int | None = None
 
 
-def _made(kf: NativeFilter | ReferenceFilter, call: Call) -> int:
-    name, keywords = call
-    made: int = kf.predict(**keywords) if name == "predict" else kf.update(name, **keywords)  # type: ignore[arg-type]
-    return made
+def _made(kf: Filter, call: Call) -> int:
+    if call.sensor is None:
+        return kf.predict(call.u, call.dt)
+    return kf.update(call.sensor, call.z, call.u, call.mask)
 
 
 def _calls(spec: Spec, work: Plan, row: int, random: np.random.Generator) -> list[Call]:
     """The calls of one row in order."""
-    u = {"u": work.u[row]} if spec.inputs else {}
+    u = work.u[row] if spec.inputs else None
     run_time = spec.dt is not None and spec.dt.run_time
     calls: list[Call] = []
     if work.step[row]:
-        calls.append(("predict", {**u, "dt": float(work.dt[row])} if run_time else {**u}))
+        calls.append(Call(u=u, dt=float(work.dt[row]) if run_time else None))
     first = 0
     for i, sensor in enumerate(spec.measurements):
         last = first + len(sensor.components)
         if work.mask[row, i]:
-            keywords: dict[str, object] = {"z": work.z[row, first:last], **u}
-            if sensor.partial and random.random() < 0.2:
-                keywords["mask"] = int(random.integers(0, 1 << (last - first)))
-            calls.append((sensor.name, keywords))
+            masked = sensor.partial and random.random() < 0.2
+            mask = int(random.integers(0, 1 << (last - first))) if masked else None
+            calls.append(Call(sensor.name, work.z[row, first:last], u, mask=mask))
         first = last
     return calls
 
 
 def _rounded(kf: NativeFilter, work: Plan) -> Plan:
     """The same numbers as the scalar type carries them."""
-    scalar, units = kf._value, kf._units
-    z = np.concatenate([units.z[name] for name in kf.sensors]) if kf.sensors else np.empty(0)
+    scalar, units = kf.struct.value, kf.struct.units
     return Plan(
         work.t,
         work.step,
         scalar.to_physical(scalar.to_raw(work.dt, units.dt), units.dt),
         scalar.to_physical(scalar.to_raw(work.u, units.u), units.u),
         work.mask,
-        scalar.to_physical(scalar.to_raw(work.z, z), z),
+        scalar.to_physical(scalar.to_raw(work.z, units.readings), units.readings),
     )
 
 
@@ -235,13 +238,13 @@ class _Scales:
         self._upper = np.triu_indices(n)
         self.pairs = [f"{self.names[i]}, {self.names[j]}" for i, j in zip(*self._upper, strict=True)]
         self._periods = ref.model.periods
-        dtype = kf._value.dtype
+        dtype = kf.struct.value.dtype
         floating = dtype.kind == "f"
         self._dtype = dtype if floating else np.dtype(np.float64)
-        self._lsb = None if floating else kf._units.x
-        self._P_lsb = 0.0 if floating else kf._units.P
+        self._lsb = None if floating else kf.struct.units.x
+        self._P_lsb = 0.0 if floating else kf.struct.units.P
         self._relative = 8 * float(np.finfo(dtype).eps) if floating else 0.0
-        self._absolute = np.zeros(n) if floating else 4 * kf._units.x
+        self._absolute = np.zeros(n) if floating else 4 * kf.struct.units.x
         self._magnitude = np.abs(ref.x)
         self._variance = np.diag(ref.P).copy()
 

@@ -14,6 +14,7 @@ from kfgen.native import driver, header
 from kfgen.native.compiler import build
 from kfgen.native.filter import NativeFilter
 from kfgen.native.run import RunResult
+from kfgen.native.struct import Struct
 from kfgen.override import override
 from kfgen.spec.types import Spec
 
@@ -87,7 +88,7 @@ def _load(spec: Spec, parsed: header.Header, library: str) -> NativeFilter:
     seen, compiled = ffi.sizeof(f"{spec.name}_t"), getattr(lib, f"{spec.name}_kfgen_size")()
     if seen != compiled:  # a declaration was misread; going on would corrupt memory
         raise KfgenError(f"{spec.name}_t has {compiled} bytes in C, but {seen} by its header")
-    return NativeFilter(spec, parsed, ffi, lib)
+    return NativeFilter(spec, Struct(spec, parsed, ffi, lib))
 
 
 def _loaded(spec: SpecOrPath) -> Spec:

@@ -120,6 +120,7 @@ class Units:
             sensor.name: np.array([value.unit(f"{sensor.name}_{each.name}") for each in sensor.components])
             for sensor in spec.measurements
         }
+        self.readings: Array = np.concatenate([np.empty(0), *self.z.values()])  # all sensors' z, one after the other
         self.R: dict[str, Array] = {name: np.outer(z, z) / value.one for name, z in self.z.items()}
         self.parameters = {each.name: value.unit(each.name) for each in spec.parameters}
         run_time = spec.dt is not None and spec.dt.run_time

@@ -46,7 +46,7 @@ def zs(step) -> str:
 
 
 def memory(kf) -> bytes:
-    return bytes(kf._ffi.buffer(kf._kf))
+    return bytes(kf.struct.ffi.buffer(kf.struct.data))
 
 
 def replayed(job, flags: tuple[str, ...], target: str, size: int) -> list[bytes]:

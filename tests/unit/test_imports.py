@@ -19,6 +19,7 @@ ALLOWED = {
     # on nothing
     "errors": set(),
     "status": set(),
+    "interface": set(),
     "files": {"errors"},
     # the spec, and what reads only it
     "spec": {"errors"},
@@ -39,7 +40,7 @@ ALLOWED = {
     # the compiled filter, and what uses it
     "native": SPEC | {"files", "generate", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
-    "check": SPEC | {"generate", "native", "override", "reference", "simulate", "status"},
+    "check": SPEC | {"generate", "interface", "native", "override", "reference", "simulate", "status"},
     "cost": SPEC | {"logs", "native", "status"},
     "selftest": SPEC
     | {"emit", "filters", "fixed", "generate", "ir", "logs", "native", "reference", "scalars", "simulate", "status"},
