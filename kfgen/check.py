@@ -26,6 +26,7 @@ import numpy as np
 
 from kfgen.interface import Array, Filter
 from kfgen.native.run import Plan, plan
+from kfgen.scalar_names import DOUBLE, FLOAT
 from kfgen.simulate import simulate
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status, describe
@@ -38,7 +39,7 @@ STEPS = 400
 SEED = 1
 GAPS = 0.05
 DIFFERENT_DECISIONS = 0.01
-TOLERANCES = {"float": 2e-3, "double": 1e-6}
+TOLERANCES = {FLOAT: 2e-3, DOUBLE: 1e-6}
 FIXED_TOLERANCE = 2e-2
 
 

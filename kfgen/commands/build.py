@@ -14,6 +14,7 @@ import click
 from kfgen.commands.options import aligned, example, load_spec, scalar_option
 from kfgen.errors import KfgenError, Mistake, SpecError
 from kfgen.layouts import Package, arrange, layouts
+from kfgen.scalar_names import is_fixed
 
 if TYPE_CHECKING:
     from kfgen.generate import Generated
@@ -153,7 +154,7 @@ def _package(spec: Spec, generated: Generated, texts: Mapping[str, str], layout:
 
 def _read(log: Path | None, spec: Spec) -> Log | None:
     """The log that fixed point takes ranges from; other scalars have no use for one."""
-    if log is None or spec.scalar in ("float", "double"):
+    if log is None or not is_fixed(spec.scalar):
         return None
     from kfgen.logs import read
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.commands.options import example, load_spec, scalar_option, spec_argument
+from kfgen.scalar_names import FLOAT
 
 if TYPE_CHECKING:
     from kfgen.native.run import RunResult
@@ -71,7 +72,7 @@ def run(spec: Path, log: Path, out: Path | None, plot: Path | None, scalar: str 
 
 def columns(spec: Spec, result: RunResult) -> dict[str, NDArray[np.generic]]:
     """A run as columns of a CSV file; numbers keep the filter's own precision."""
-    own = np.float32 if spec.scalar == "float" else np.float64  # so that they print as short as they are
+    own = np.float32 if spec.scalar == FLOAT else np.float64  # so that they print as short as they are
     out: dict[str, NDArray[np.generic]] = {"t": result.t}
     names = [state.name for state in spec.states]
     out |= {f"x.{name}": result.x[:, i].astype(own) for i, name in enumerate(names)}

@@ -14,6 +14,7 @@ from kfgen.emit.view import View
 from kfgen.fixed.scalar import Fixed
 from kfgen.generate import Generated
 from kfgen.native.header import Header, parse
+from kfgen.scalar_names import DOUBLE
 from kfgen.scalars import SCALARS, Scalar
 from kfgen.selftest.exact import record_exactly
 from kfgen.selftest.record import Record, record
@@ -140,7 +141,7 @@ def _nearness(spec: Spec, scalar: Scalar, tolerance: float) -> Nearness:
     return Nearness(
         f"{tolerance:g}", scalar.literal(Fraction(str(tolerance))), scalar.literal(ULPS * scalar.epsilon),
         scalar.literal(Fraction(1, 10000)), scalar.literal(Fraction(2)),
-        ("1e-2", "2e-6") if spec.scalar == "double" else None,
+        ("1e-2", "2e-6") if spec.scalar == DOUBLE else None,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ Validation, error messages and the reference page all derive from these tables; 
 
 from __future__ import annotations
 
+from kfgen.scalar_names import DOUBLE, FLOAT, RULE
 from kfgen.spec.schema_filter import CODE, FILTER, FIXED
 from kfgen.spec.schema_model import (
     COMPONENT,
@@ -74,7 +75,7 @@ TOP = Record(
         Key("kfgen", Whole(1, 1), "The version of the language: 1.", required=True),
         Key("name", Text(), "The prefix of all that is emitted; a C identifier.", required=True),
         Key("description", Text(), "Goes into the header comment."),
-        Key("scalar", Text(), "`float`, `double` or `q<m>.<n>` with m + n = 32 and 8 <= n <= 24.", "float"),
+        Key("scalar", Text(), f"`{FLOAT}`, `{DOUBLE}` or `q<m>.<n>` with {RULE}.", FLOAT),
         Key(
             "constants",
             Table("constant", CONSTANT, declares=True),

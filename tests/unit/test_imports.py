@@ -14,22 +14,23 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "kfgen"
 
-SPEC = {"errors", "spec"}
+SPEC = {"errors", "scalar_names", "spec"}
 ALLOWED = {
     # on nothing
     "errors": set(),
     "status": set(),
     "interface": set(),
+    "scalar_names": set(),
     "files": {"errors"},
     # the spec, and what reads only it
-    "spec": {"errors"},
+    "spec": {"errors", "scalar_names"},
     "override": SPEC,
     "logs": SPEC | {"files"},
     "reference": SPEC,
     "simulate": SPEC | {"logs", "reference"},
     # from a spec to C
     "ir": {"errors"},
-    "scalars": {"errors", "ir"},
+    "scalars": {"errors", "ir", "scalar_names"},
     "quantiles": {"ir"},
     "model": SPEC | {"ir"},
     "filters": SPEC | {"ir", "model", "quantiles", "scalars"},

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from kfgen.scalar_names import FLOAT, KNOWN, is_scalar
 from kfgen.spec.builders.filter import FilterBuilder
 from kfgen.spec.builders.model import ModelBuilder
 from kfgen.spec.builders.modes import ModesBuilder
 from kfgen.spec.builders.values import Values
 from kfgen.spec.constants import keep
-from kfgen.spec.names import SCALARS, is_scalar
 from kfgen.spec.problems import short
 from kfgen.spec.raw import Fields, Word, entries, limits, matrix
 from kfgen.spec.tree import Expression
@@ -65,11 +65,11 @@ class Builder:
         return ModesBuilder(self.values, self.model, self.filters, top).with_modes(spec, imm)
 
     def scalar(self) -> str:
-        text = self.top.get("scalar", "float")
+        text = self.top.get("scalar", FLOAT)
         if not is_scalar(text):
             at = self.walker.value_place("scalar", self.top.at("scalar"))
-            self.problems.add(at, f"there is no scalar {short(text)}", SCALARS)
-            return "float"
+            self.problems.add(at, f"there is no scalar {short(text)}", KNOWN)
+            return FLOAT
         return str(text)
 
     def constants(self) -> tuple[Constant, ...]:
