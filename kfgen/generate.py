@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from kfgen.budgets import Prediction, exceeded, predict
+from kfgen.emit.data import View
 from kfgen.emit.render import render
-from kfgen.emit.view import View, make_view
+from kfgen.emit.view import make_view
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter

@@ -6,20 +6,31 @@ from enum import IntFlag
 
 
 class Status(IntFlag):
-    """A bit mask. Below ERROR are warnings; an error is exactly one bit, and no warning stands beside it."""
+    """A bit mask. Below ERROR are warnings; an error is exactly one bit, and no warning stands beside it.
 
-    OK = 0
-    REGULARIZED = 0x01  # a variance was held at its floor or ceiling, or a pivot at zero
-    GLITCH_SMALL = 0x02  # robust: a measurement was given less weight
-    GLITCH_LARGE = 0x04  # robust: a measurement was given no weight
-    ANOMALY = 0x08  # adaptive: the covariance was inflated; gate: reset after too many rejections
-    GATED = 0x10  # the vector was rejected, the filter is unchanged
-    SATURATED = 0x20  # a fixed-point value reached the end of its range, or a function of its domain
-    DT_CLAMPED = 0x40  # dt was outside [min, max]
-    POINT_REJECTED = 0x80  # a sigma point was replaced
-    NULL_ARGUMENT = 0x100
-    NOT_FINITE = 0x200  # an argument or a model value is NaN or infinite
-    NOT_POSITIVE = 0x400  # a variance is negative beyond round-off, or dt <= 0
+    doc: what the bit tells, as the header of a filter says it.
+    """
+
+    doc: str
+
+    def __new__(cls, bit: int, doc: str = "") -> Status:
+        self = int.__new__(cls, bit)
+        self._value_ = bit
+        self.doc = doc
+        return self
+
+    OK = 0x000
+    REGULARIZED = 0x001, "a variance was limited, or taken to zero by round-off"
+    GLITCH_SMALL = 0x002, "an innovation was weighted down"
+    GLITCH_LARGE = 0x004, "an innovation was cut off"
+    ANOMALY = 0x008, "an innovation beyond its variance was taken all the same"
+    GATED = 0x010, "the measurement was refused; nothing but nis has changed"
+    SATURATED = 0x020, "a number was clipped to its range"
+    DT_CLAMPED = 0x040, "dt was outside of its limits and was clamped"
+    POINT_REJECTED = 0x080, "a sigma point was replaced"
+    NULL_ARGUMENT = 0x100, "a pointer is NULL"
+    NOT_FINITE = 0x200, "an argument or a value of the model is NaN or infinite"
+    NOT_POSITIVE = 0x400, "a variance or dt is not positive"
 
 
 ERROR = 0x100

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from kfgen.emit.text import WIDTH, comment
 from kfgen.ir.nodes import Constants, Node, Table
 from kfgen.ir.program import (
     Assign,
@@ -21,7 +22,6 @@ from kfgen.ir.program import (
 )  # fmt: skip
 from kfgen.scalars import Scalar
 
-WIDTH = 100
 _COMPARE = {"lt": "<", "le": "<="}
 # binding strength: what binds less tightly than its context asks stands in parentheses
 _TERNARY, _OR, _AND, _RELATION, _SUM, _PRODUCT, _UNARY, _ATOM = range(8)
@@ -242,19 +242,6 @@ class Printer:
 
 def _assignment(target: str, value: str) -> str:
     return f"{target} = {value};"
-
-
-def comment(text: str, depth: int = 0) -> list[str]:
-    """A comment in lines of at most WIDTH columns."""
-    words = text.split()
-    indent = "    " * depth
-    lines = [indent + "/*"]
-    for word in words:
-        if len(lines[-1]) + 1 + len(word) > WIDTH - 3:
-            lines.append(indent + "  ")
-        lines[-1] += " " + word
-    lines[-1] += " */"
-    return lines
 
 
 def _wrapped(text: str, depth: int) -> list[str]:

@@ -10,8 +10,8 @@ from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-from kfgen.emit.printer import WIDTH
-from kfgen.emit.view import View
+from kfgen.emit.data import View
+from kfgen.emit.text import WIDTH
 
 _WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
 
@@ -42,7 +42,7 @@ def _environment() -> Environment:
 
 def render(view: View) -> dict[str, str]:
     """File name -> text."""
-    return {f"{view.name}.{suffix}": render_c(f"filter.{suffix}.j2", v=view) for suffix in ("h", "c")}
+    return {f"{view.name}.{suffix}": render_c(f"c/filter.{suffix}.j2", v=view) for suffix in ("h", "c")}
 
 
 def render_c(template: str, **names: Any) -> str:

@@ -1,4 +1,4 @@
-"""The arithmetic of fixed point: what the C routines `<prefix>_q_<op>` of templates/helpers_q.j2 compute, bit for bit.
+"""The arithmetic of fixed point: what the C routines `<prefix>_q_<op>` of templates/helpers/q.j2 compute, bit for bit.
 
 A raw value r with f fraction bits stands for r * 2^-f. Raw values are plain ints in the range of an int32_t.
 Everything rounds to nearest, ties upwards: floor(v + 1/2); `mul`, `madd`, `shift` and `narrow` round down instead

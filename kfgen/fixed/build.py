@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from kfgen.emit.view import FixedPoint
+from kfgen.emit.fixed_point import FixedPoint
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed import tables

@@ -1,4 +1,4 @@
-"""Sines and angles: the twins of templates/helpers_q_circular.j2, step by step."""
+"""Sines and angles: the twins of templates/helpers/q_circular.j2, step by step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exponentials and logarithms: the twins of templates/helpers_q_exponential.j2, step by step."""
+"""Exponentials and logarithms: the twins of templates/helpers/q_exponential.j2, step by step."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ FINE = 26  # fraction bits that a probability has inside, as sums of them have
 class Fixed:
     """int32_t, every value with a binary point of its own, which the program knows and the number does not."""
 
-    helpers = "helpers_q.j2"
+    helpers = "helpers/q.j2"
     helper_ops = frozenset({"segment"})
     silent_ops = frozenset({"q_abs", "q_min", "q_max", "q_sign", "q_count", "q_fma"}) | {
         f"q_{name}" for name in WITHOUT_STATUS

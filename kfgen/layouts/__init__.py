@@ -13,7 +13,7 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from kfgen.emit.view import View
+    from kfgen.emit.data import View
 
 
 @dataclass(frozen=True)

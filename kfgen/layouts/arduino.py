@@ -7,8 +7,9 @@ from kfgen.layouts import Package
 
 
 def arrange(package: Package) -> dict[str, str]:
+    sketch = f"{package.name}_example"
     return {
-        "library.properties": render_text("arduino_library.j2", p=package),
+        "library.properties": render_text("layouts/arduino_library.j2", p=package),
         **{f"src/{name}": text for name, text in package.sources.items()},
-        f"examples/{package.name}_example/{package.name}_example.ino": render_text("arduino_sketch.j2", p=package),
+        f"examples/{sketch}/{sketch}.ino": render_text("layouts/arduino_sketch.j2", p=package),
     }

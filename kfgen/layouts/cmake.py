@@ -7,7 +7,7 @@ from kfgen.layouts import Package
 
 
 def arrange(package: Package) -> dict[str, str]:
-    added = {"CMakeLists.txt": render_text("cmake_lists.j2", p=package)}
+    added = {"CMakeLists.txt": render_text("layouts/cmake_lists.j2", p=package)}
     if package.selftest:
-        added["test/main.c"] = render_text("selftest_main.j2", p=package)
+        added["test/main.c"] = render_text("selftest/main.j2", p=package)
     return {**package.sources, **added}

@@ -9,7 +9,7 @@ from kfgen.layouts import Package
 def arrange(package: Package) -> dict[str, str]:
     return {
         **package.sources,
-        "zephyr/module.yml": render_text("zephyr_module.j2", p=package),
-        "zephyr/Kconfig": render_text("zephyr_kconfig.j2", p=package),
-        "CMakeLists.txt": render_text("zephyr_cmake.j2", p=package),
+        "zephyr/module.yml": render_text("layouts/zephyr_module.j2", p=package),
+        "zephyr/Kconfig": render_text("layouts/zephyr_kconfig.j2", p=package),
+        "CMakeLists.txt": render_text("layouts/zephyr_cmake.j2", p=package),
     }

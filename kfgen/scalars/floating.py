@@ -17,7 +17,7 @@ _LIBM = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "t
 class Floating:
     """An IEEE 754 type."""
 
-    helpers = "helpers_float.j2"
+    helpers = "helpers/float.j2"
     helper_ops = frozenset({"finite", "wrap", "segment", "min", "max", "sign"})
     silent_ops: frozenset[str] = frozenset()
     uniform = True

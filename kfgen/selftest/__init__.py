@@ -8,9 +8,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from kfgen.emit.printer import WIDTH
+from kfgen.emit.data import View
 from kfgen.emit.render import render_c
-from kfgen.emit.view import View
+from kfgen.emit.text import WIDTH
 from kfgen.fixed.scalar import Fixed
 from kfgen.generate import Generated
 from kfgen.native.header import Header, parse
@@ -93,7 +93,7 @@ def selftest(spec: Spec, generated: Generated, track: Track | None = None) -> di
         scalar = fixed = Fixed(spec.scalar, spec.fixed.rounding)
         found = record_exactly(spec, generated.code, fixed, header, track)
     made = _view(spec, generated, scalar, header, found)
-    return {f"{spec.name}_selftest.c": render_c("selftest.c.j2", s=made, v=made.view)}
+    return {f"{spec.name}_selftest.c": render_c("selftest/selftest.c.j2", s=made, v=made.view)}
 
 
 def _view(spec: Spec, generated: Generated, scalar: Scalar, header: Header, found: Record) -> SelfTest:

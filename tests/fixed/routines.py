@@ -41,7 +41,7 @@ HEAD = "#include <stdbool.h>\n#include <stdint.h>\n#define SATURATED UINT32_C(0x
 
 def source(ops: Iterable[str] = ARGUMENTS, floor: bool = False) -> str:
     """The static functions, prefix `t`."""
-    return HEAD + macro("helpers_q.j2", "routines", "t", closure(ops, floor), tables, "SATURATED", floor=floor)
+    return HEAD + macro("helpers/q.j2", "routines", "t", closure(ops, floor), tables, "SATURATED", floor=floor)
 
 
 def callers() -> str:

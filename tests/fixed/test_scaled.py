@@ -80,10 +80,10 @@ def routines(floor: bool) -> str:
     view = SimpleNamespace(
         name="t", NAME="T", routines=SimpleNamespace(own=("fit", "fma", "mac"), floor=floor), helpers=()
     )
-    basic = macro("helpers_q.j2", "routines", "t", closure(["asr", "moved", "mul", "product", "round"], floor), tables,
+    basic = macro("helpers/q.j2", "routines", "t", closure(["asr", "moved", "mul", "product", "round"], floor), tables,
                   "T_SATURATED", floor=floor)  # fmt: skip
     head = HEAD + "#define T_SATURATED SATURATED\ntypedef uint32_t t_status_t;\n"
-    return head + basic + macro("helpers_scaled.j2", "define", view)
+    return head + basic + macro("helpers/scaled.j2", "define", view)
 
 
 @pytest.mark.parametrize("rounding", ["nearest", "floor"])

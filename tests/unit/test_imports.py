@@ -35,7 +35,7 @@ ALLOWED = {
     "model": SPEC | {"ir"},
     "filters": SPEC | {"ir", "model", "quantiles", "scalars"},
     "fixed": SPEC | {"emit", "filters", "ir", "logs", "model", "scalars"},
-    "emit": {"errors", "filters", "ir", "scalars"},
+    "emit": {"errors", "filters", "ir", "scalars", "status"},
     "budgets": SPEC | {"filters", "ir", "scalars"},
     "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars"},
     # the compiled filter, and what uses it

@@ -42,7 +42,7 @@ def test_holds_the_package_and_nothing_else(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     files = [path for path in (ROOT / "kfgen").rglob("*") if path.suffix in (".py", ".j2", ".typed", ".h", ".zig")]
     ours = {str(path.relative_to(ROOT)) for path in files}
-    templates = {f"kfgen/templates/{path.name}" for path in (ROOT / "templates").iterdir()}
+    templates = {f"kfgen/{path.relative_to(ROOT)}" for path in (ROOT / "templates").rglob("*.j2")}
     assert ours | templates <= names
     assert "kfgen/py.typed" in names
     assert {name.partition("/")[0] for name in names} == {"kfgen", f"{wheel.name.rsplit('-', 3)[0]}.dist-info"}
