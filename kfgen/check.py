@@ -86,27 +86,6 @@ class Outcome:
         close = self.x.error <= max(self.tolerance, 8 * self.resolution) and self.P.error <= self.tolerance
         return close and few and not self.errors_differ
 
-    def text(self) -> str:
-        """The result in a few lines."""
-
-        def place(worst: Worst) -> str:
-            return f" ({worst.where})" if worst.where else ""
-
-        out = [
-            f"{self.name} ({self.scalar}): {self.steps} steps, {self.calls} calls against the reference",
-            f"  x: error at most {self.x.error:.1e} sigma{place(self.x)}",
-            f"  P: error at most {self.P.error:.1e} of sqrt(P_ii P_jj){place(self.P)}",
-        ]
-        if self.differences:
-            out.append(f"  status: differs in {len(self.differences)} calls, first in {self.differences[0]}")
-        if 8 * self.resolution > self.tolerance:
-            out.append(f"  a reference with its x rounded to {self.scalar}: {self.resolution:.1e} sigma")
-        if self.lost:
-            out.append(f"  {self.lost} steps not compared: rounding alone moves the reference further than that")
-        out += [f"  {line}" for line in self.certificate]
-        verdict = "passed" if self.passed else "FAILED"
-        return "\n".join([*out, f"  tolerance {self.tolerance:.0e}: {verdict}"])
-
 
 def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
     """Compile `spec` and compare it with the reference. KfgenError without a compiler; SpecError."""

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping
 from shutil import which
 
-from kfgen.commands.options import aligned
+from kfgen.commands.tables import aligned
 from kfgen.cost import Cost, measure
 from kfgen.generate import build
 from kfgen.override import override

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from kfgen.commands.options import aligned
+from kfgen.commands.tables import aligned
 
 SPEC = "vehicle_small.yaml"
 

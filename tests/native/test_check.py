@@ -12,7 +12,6 @@ def test_a_right_filter_passes(kf, spec):
     assert outcome.passed
     assert outcome.P.error < 1e-5
     assert not outcome.differences
-    assert "passed" in outcome.text()
 
 
 @pytest.mark.parametrize(
@@ -31,7 +30,6 @@ def test_a_wrong_filter_fails(spec, files, right, wrong):
     broken = {**files, "vehicle_small.c": files["vehicle_small.c"].replace(right, wrong)}
     outcome = compare(load_filters([(spec, broken)])[0], reference(spec), 100)
     assert not outcome.passed
-    assert "FAILED" in outcome.text()
 
 
 def test_tolerances():
