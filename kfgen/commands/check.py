@@ -48,7 +48,7 @@ def report(outcome: Outcome) -> list[Part]:
         f"{outcome.name} ({outcome.scalar}): {outcome.steps} steps, {outcome.calls} calls against the reference",
         Table(
             [
-                ["", "largest error", "of", "where"],
+                ["quantity", "largest error", "of", "where"],
                 ["x", f"{outcome.x.error:.1e}", "sigma", outcome.x.where],
                 ["P", f"{outcome.P.error:.1e}", "sqrt(P_ii P_jj)", outcome.P.where],
             ],

@@ -59,14 +59,18 @@ def show(*parts: Part, err: bool = False) -> None:
         for part in parts:
             console.print(_rich(part), soft_wrap=isinstance(part, Paths))
         return
-    for part in parts:
-        for line in _plain(part):
-            click.echo(line, err=err)
+    for line in lines(*parts):
+        click.echo(line, err=err)
 
 
 def on_terminal(err: bool = False) -> bool:
     stream = sys.stderr if err else sys.stdout
     return stream is not None and stream.isatty()
+
+
+def lines(*parts: Part) -> list[str]:
+    """The parts as plain text."""
+    return [line for part in parts for line in _plain(part)]
 
 
 def _plain(part: Part) -> list[str]:

@@ -10,7 +10,8 @@ import pytest
 from emitted import problems
 from variants import call
 
-from kfgen.commands.build import Built, table
+from kfgen.commands.build import Built, report
+from kfgen.commands.tables import lines
 from kfgen.errors import SpecError
 from kfgen.generate import Generated, build
 from kfgen.ir.program import Call, walk
@@ -89,10 +90,10 @@ def test_what_does_not_fit_is_told(unroll):
 
 def test_the_table_tells_the_forms(tmp_path):
     spec = chain(8, "auto", 4500, covariance="ud", update="bierman")
-    text = table([Built(spec, build(spec), {}, tmp_path)])
+    text = "\n".join(lines(*report([Built(spec, build(spec), {}, tmp_path)])))
     assert "predict: loops" in text
     assert "update_position: unrolled" in text
-    assert "loops" not in table([Built(chain(8), build(chain(8)), {}, tmp_path)])
+    assert "loops" not in "\n".join(lines(*report([Built(chain(8), build(chain(8)), {}, tmp_path)])))
 
 
 def test_a_single_state_has_nothing_to_loop_over():
