@@ -1,4 +1,4 @@
-"""Spec -> {file name: text}. Pure: the same bytes for the same spec, options and versions."""
+"""From a spec to its C files, and what they cost. Pure: the same bytes for the same spec, options and versions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kfgen.filters.build import build_filter
 from kfgen.fixed.build import FixedFilter, build_fixed
 from kfgen.fixed.scalar import Fixed
 from kfgen.ir.count import operations
-from kfgen.ir.schedule import RESERVED
+from kfgen.ir.names import RESERVED
 from kfgen.logs import Log
 from kfgen.scalars import SCALARS, Scalar
 from kfgen.spec.types import Spec

@@ -1,4 +1,4 @@
-"""Chi-square quantiles to 30 digits, the same on every machine."""
+"""Chi-square quantiles and ln(2 pi) to 30 digits, the same on every machine."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class FunctionMaker:
     def make(self, f: Function) -> FunctionView:
         saturates = self.fixed and may_saturate(f)
         has_flags = saturates or any(isinstance(s, Flag) for s in walk(f.body))
-        printer = Printer(self.name, self.scalar, self._index_name, self.tables, has_flags)
+        printer = Printer(self.name, self.scalar, self._index_name, self.tables)
         if f.private:
             printer.status = "flags"
         body = printer.statements(f.body)

@@ -13,8 +13,8 @@ from kfgen.emit.fixed_point import FixedPoint
 from kfgen.emit.functions import FunctionMaker
 from kfgen.emit.text import WIDTH, fill, safe
 from kfgen.filters.base import FilterCode
+from kfgen.ir.names import LIBRARY_NAMES
 from kfgen.ir.nodes import Constants, Table
-from kfgen.ir.schedule import LIBRARY_NAMES
 from kfgen.scalars import Scalar
 
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 
-from kfgen.ir.nodes import BOOL, INT, REAL, Constants, Node, Pool, Table
+from kfgen.ir.nodes import BOOL, INT, REAL, Constants, Node, Table
 from kfgen.ir.program import (
     Assign,
     Call,
@@ -24,9 +24,9 @@ from kfgen.ir.program import (
     If,
     Section,
     Slice,
-    Statement,
     Store,
 )  # fmt: skip
+from kfgen.ir.recording import Block, RecordingPool
 
 Number = int | Fraction
 
@@ -101,13 +101,6 @@ class Value:
         return f"Value({self.node!r})"
 
 
-@dataclass
-class Block:
-    """What was recorded in one scope: statements, and nodes where they were first made."""
-
-    items: list[Statement | Node] = field(default_factory=list)
-
-
 class Trace:
     """The recording of one function."""
 
@@ -115,8 +108,7 @@ class Trace:
 
     def __init__(self, smallest: Fraction | int = 0) -> None:
         self.smallest = smallest  # a number not above it counts as zero where it divides
-        self.pool = _RecordingPool(self)
-        self.block = Block()
+        self.pool = RecordingPool()
         self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body
         self.raised: list[tuple[Value, str]] = []  # conditions of warnings, and which
         self.depth = 0  # of loops and branches
@@ -127,6 +119,11 @@ class Trace:
 
         self.zero = self.wrapped(self.pool.zero)
         self.one = self.wrapped(self.pool.one)
+
+    @property
+    def block(self) -> Block:
+        """What is recorded at present."""
+        return self.pool.block
 
     # values ----------------------------------------------------------------------------------------
 
@@ -243,45 +240,14 @@ class Trace:
     @contextmanager
     def _scope(self, statement: For | If) -> Iterator[None]:
         self.block.items.append(statement)
-        outer, self.block = self.block, Block()
+        outer, self.pool.block = self.block, Block()
         self.blocks[id(statement)] = self.block
         mark = self.pool.mark()
         self.depth += 1
         yield
         self.depth -= 1
         self.pool.forget(mark)  # what was made inside is not in scope outside
-        self.block = outer
-
-
-class _RecordingPool(Pool):
-    """A pool that leaves each new node in the current block, where it was first made."""
-
-    def __init__(self, trace: Trace) -> None:
-        self._trace = trace
-        self._made: list[tuple[object, ...]] = []
-        super().__init__()
-
-    def make(self, op: str, args: tuple[Node, ...] = (), data: object = None, kind: str = REAL,
-             volatile: bool = False) -> Node:  # fmt: skip
-        before = self._count
-        node = super().make(op, args, data, kind, volatile)
-        if self._count != before and op != "const":
-            self._trace.block.items.append(node)
-            self._made.append((op, tuple(a.serial for a in args), data, kind))
-        return node
-
-    def fresh(self, op: str, args: tuple[Node, ...], data: object, kind: str) -> Node:
-        node = super().fresh(op, args, data, kind)
-        self._trace.block.items.append(node)
-        return node
-
-    def mark(self) -> int:
-        return len(self._made)
-
-    def forget(self, mark: int) -> None:
-        for key in self._made[mark:]:
-            self._nodes.pop(key, None)
-        del self._made[mark:]
+        self.pool.block = outer
 
 
 @dataclass(frozen=True)

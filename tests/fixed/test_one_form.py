@@ -11,7 +11,7 @@ from kfgen.filters.build import build_filter
 from kfgen.filters.frame.shared import _Key
 from kfgen.fixed.scalar import Fixed
 from kfgen.generate import UNROLLED, build
-from kfgen.ir.schedule import RESERVED
+from kfgen.ir.names import RESERVED
 from kfgen.override import override
 from kfgen.spec import loads
 from kfgen.spec.types import Spec

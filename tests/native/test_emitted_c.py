@@ -18,7 +18,7 @@ import pytest
 from emitted import ALL, EXACT, FORMS, LIBM, SCALARS, generated
 
 from kfgen.generate import generate
-from kfgen.ir.schedule import LIBRARY_NAMES
+from kfgen.ir.names import LIBRARY_NAMES
 from kfgen.native import load_filters
 from kfgen.override import override
 from kfgen.reference import reference

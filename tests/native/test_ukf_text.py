@@ -17,7 +17,7 @@ from test_emitted_c import COMPILERS, WARNINGS, absent, run, write
 from variants import built, generated
 
 from kfgen.generate import Generated, build
-from kfgen.ir.schedule import LIBRARY_NAMES
+from kfgen.ir.names import LIBRARY_NAMES
 from kfgen.reference import reference
 from kfgen.status import ERROR
 
