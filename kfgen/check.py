@@ -94,7 +94,7 @@ def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
     from kfgen.reference import reference
 
     generated = build(spec)
-    kf = load_filters([(spec, generated.files)])[0]
+    kf = load_filters([generated])[0]
     outcome = compare(kf, reference(spec), steps, seed, reference(spec))
     if generated.fixed is None:
         return outcome

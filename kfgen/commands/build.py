@@ -139,21 +139,19 @@ def generate_all(
 def _package(spec: Spec, generated: Generated, texts: Mapping[str, str], layout: str) -> Package:
     """What a layout arranges."""
     from kfgen.cost.advice import recommended_flags
-    from kfgen.native.header import parse
     from kfgen.spec.constants import value
 
-    header_text = texts[f"{spec.name}.h"]
-    header = parse(header_text, spec.name)
+    declared = generated.declarations
     functions = ["predict", *(f"update_{sensor.name}" for sensor in spec.measurements)]
     selftest = " --selftest" if f"{spec.name}_selftest.c" in texts else ""
     return Package(
         view=generated.view,
         sources=texts,
         command=f"{generated.view.command}{selftest} --layout {layout}",
-        flags=tuple(recommended_flags(header_text)),
+        flags=tuple(recommended_flags(generated.view)),
         step=1.0 if spec.dt is None else float(value(spec.dt.nominal.tree, spec)),
-        run_time=header.takes("predict", "dt"),
-        takes_inputs=tuple(name for name in functions if header.takes(name, "u")),
+        run_time=declared.takes("predict", "dt"),
+        takes_inputs=tuple(name for name in functions if declared.takes(name, "u")),
     )
 
 

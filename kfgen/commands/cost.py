@@ -77,15 +77,15 @@ def cost(
         advance(0, "log")
         data = simulate(loaded, rows) if log is None else logs.read(log, loaded)
         advance(1, "filter")
-        files = build(loaded, judge=False).files
+        generated = build(loaded, judge=False)
         advance(2, "measuring")
-        plain = measure(loaded, files, data, target, cflags.split(), compiler=compiler, rows=rows)
+        plain = measure(generated, data, target, cflags.split(), compiler=compiler, rows=rows)
         found = {"measured": plain}
-        flags = recommended_flags(files[f"{loaded.name}.h"])
+        flags = recommended_flags(generated.view)
         if flags and processor.takes_gcc_flags(compiler):
             advance(3, "measuring with the recommended flags")
             more = [*flags, *cflags.split()]
-            found["recommended"] = measure(loaded, files, data, target, more, compiler=compiler, rows=rows)
+            found["recommended"] = measure(generated, data, target, more, compiler=compiler, rows=rows)
     over = exceeded(loaded, list(found.values())[-1])
     if as_json:
         click.echo(json.dumps(_plain(found, mhz, over, min(rows, data.rows), log), indent=2))

@@ -209,7 +209,7 @@ class NativeFilter:
             raise KeyError(unknown("sensor", sensor, self.sensors)) from None
 
     def __repr__(self) -> str:
-        return f"<kfgen filter {self.name}: {len(self.states)} states, {self.struct.header.real}>"
+        return f"<kfgen filter {self.name}: {len(self.states)} states, {self.struct.declared.real}>"
 
     # arguments
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kfgen.emit.declarations import Declarations
 from kfgen.native.arguments import numpy_type
-from kfgen.native.header import Header
 from kfgen.native.values import Array, Units, Value, value_of
 from kfgen.spec.types import Spec
 from kfgen.status import Status
@@ -17,16 +17,16 @@ from kfgen.status import Status
 class Struct:
     """One filter's struct.
 
-    ffi, lib: cffi's. data: the pointer to the struct. fields: the names of its fields. value, units: how its
-    numbers become physical ones.
+    declared: what its header declares. ffi, lib: cffi's. data: the pointer to the struct. fields: the names of
+    its fields. value, units: how its numbers become physical ones.
     """
 
-    def __init__(self, spec: Spec, header: Header, ffi: Any, lib: Any) -> None:
+    def __init__(self, spec: Spec, declared: Declarations, ffi: Any, lib: Any) -> None:
         self.name = spec.name
-        self.header = header
+        self.declared = declared
         self.ffi = ffi
         self.lib = lib
-        self.value: Value = value_of(header)
+        self.value: Value = value_of(declared)
         self.units = Units(spec, self.value)
         self.data = ffi.new(f"{spec.name}_t *")
         self.fields = {name for name, _ in ffi.typeof(f"{spec.name}_t").fields}
@@ -45,11 +45,11 @@ class Struct:
     # functions
 
     def has(self, function: str) -> bool:
-        return self.header.has(function)
+        return self.declared.has(function)
 
     def takes(self, function: str, argument: str) -> bool:
         """Whether there is a function, and it has an argument of that name."""
-        return self.header.takes(function, argument)
+        return self.declared.takes(function, argument)
 
     def function(self, name: str) -> Any:
         """The C function `<prefix>_<name>`; AttributeError where the filter has none."""

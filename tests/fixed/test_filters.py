@@ -93,7 +93,7 @@ def follow(text, scalar="q16.16", steps=120, driven=(), **chosen):
     """Run C, interpreter and reference side by side; the largest error in sigma. driven: sensors that take inputs."""
     spec = override(loads(text) if "\n" in text else kfgen.load(text), scalar, filter=chosen)
     generated = build(spec)
-    kf = native.load_filters([(spec, generated.files)])[0]
+    kf = native.load_filters([generated])[0]
     twin, ref = Twin(generated), kfgen.reference(override(spec, "double"))
     twin.call("init")
     log = simulate.simulate(spec, steps, seed=5)

@@ -5,6 +5,7 @@ import pytest
 from kfgen.check import compare, tolerance_of
 from kfgen.native import load_filters
 from kfgen.reference import reference
+from tests.native.small import vehicle_small
 
 
 def test_a_right_filter_passes(kf, spec):
@@ -28,7 +29,7 @@ def test_a_right_filter_passes(kf, spec):
 def test_a_wrong_filter_fails(spec, files, right, wrong):
     assert right in files["vehicle_small.c"]
     broken = {**files, "vehicle_small.c": files["vehicle_small.c"].replace(right, wrong)}
-    outcome = compare(load_filters([(spec, broken)])[0], reference(spec), 100)
+    outcome = compare(load_filters([vehicle_small(spec, broken)])[0], reference(spec), 100)
     assert not outcome.passed
 
 

@@ -193,7 +193,7 @@ def test_models_that_blow_up(form):
             ):
                 spec = override(loads(text), scalar, filter=FORMS[form])
                 pairs.append((f"{kind}_{name}", name, spec))
-        filters = load_filters([(spec, build(spec).files) for _, _, spec in pairs], flags=["-O0"])
+        filters = load_filters([build(spec) for _, _, spec in pairs], flags=["-O0"])
         for (label, name, _), kf in zip(pairs, filters, strict=True):
             value = BLOW_UPS[name][2]
             if name == "product":
@@ -210,7 +210,7 @@ def test_the_first_error_wins(form):
     """NOT_FINITE stands before NOT_POSITIVE, whichever a variance or a value shows."""
     text = one_state("first", "exp(x)", "y + x/2").replace("Q: {x: q}", "Q: {x: q, y: q}")
     spec = override(loads(text), "float", filter=FORMS[form])
-    kf = load_filters([(spec, build(spec).files)])[0]
+    kf = load_filters([build(spec)])[0]
     for name in ("q", "r"):
         kf.init()
         kf.parameters[name] = -1e6
@@ -231,7 +231,7 @@ def test_limits_hide_nothing(form):
     bounded = one_state("bounded", "x + exp(w)", "x").replace("x: {init: 1, var", "x: {init: 1, bounds: [0, 2], var")
     capped = one_state("capped", "0.5*x + y", "x", extra=", variance_ceiling: 100, variance_floor: 1e-6")
     specs = [override(loads(text), "float", filter=FORMS[form]) for text in (bounded, capped)]
-    kf, ceiling = load_filters([(spec, build(spec).files) for spec in specs])
+    kf, ceiling = load_filters([build(spec) for spec in specs])
     wrong = []
     before = bytes(kf)
     if (status := kf.predict([1000])) != Status.NOT_FINITE or bytes(kf) != before:

@@ -39,10 +39,10 @@ ALLOWED = {
     "budgets": SPEC | {"filters", "ir", "scalars"},
     "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars"},
     # the compiled filter, and what uses it
-    "native": SPEC | {"files", "generate", "logs", "override", "status"},
+    "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC | {"generate", "interface", "native", "override", "reference", "simulate", "status"},
-    "cost": SPEC | {"logs", "native", "status"},
+    "cost": SPEC | {"emit", "logs", "native", "status"},
     "selftest": SPEC
     | {"emit", "filters", "fixed", "generate", "ir", "logs", "native", "reference", "scalars", "simulate", "status"},
     "layouts": {"emit"},
