@@ -27,7 +27,7 @@ from kfgen.reference.sensor import Reading
 from kfgen.reference.sigma_points import lower_root
 from kfgen.reference.spread import Spread, downdated, pivots, settled, spread
 from kfgen.reference.status import Status, StepError
-from kfgen.scalar_names import DOUBLE
+from kfgen.spec import DOUBLE
 from kfgen.spec.types import Adaptive
 
 

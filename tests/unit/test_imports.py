@@ -26,7 +26,7 @@ ALLOWED = {
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
     "logs": SPEC | {"files"},
-    "reference": SPEC,
+    "reference": {"errors", "spec"},
     "simulate": SPEC | {"logs", "reference"},
     # from a spec to C
     "ir": {"errors"},
