@@ -18,14 +18,15 @@ type can carry, so that what differs is the filters' own arithmetic.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kfgen.geometry import part_of
+from kfgen.interface import Array, Filter
 from kfgen.native.run import Plan, plan
+from kfgen.scalar_names import DOUBLE, FLOAT
 from kfgen.simulate import simulate
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status, describe
@@ -34,13 +35,11 @@ if TYPE_CHECKING:
     from kfgen.native.filter import NativeFilter
     from kfgen.reference import ReferenceFilter
 
-Array = NDArray[np.float64]
-
 STEPS = 400
 SEED = 1
 GAPS = 0.05
 DIFFERENT_DECISIONS = 0.01
-TOLERANCES = {"float": 2e-3, "double": 1e-6}
+TOLERANCES = {FLOAT: 2e-3, DOUBLE: 1e-6}
 FIXED_TOLERANCE = 2e-2
 
 
@@ -87,27 +86,6 @@ class Outcome:
         close = self.x.error <= max(self.tolerance, 8 * self.resolution) and self.P.error <= self.tolerance
         return close and few and not self.errors_differ
 
-    def text(self) -> str:
-        """The result in a few lines."""
-
-        def place(worst: Worst) -> str:
-            return f" ({worst.where})" if worst.where else ""
-
-        out = [
-            f"{self.name} ({self.scalar}): {self.steps} steps, {self.calls} calls against the reference",
-            f"  x: error at most {self.x.error:.1e} sigma{place(self.x)}",
-            f"  P: error at most {self.P.error:.1e} of sqrt(P_ii P_jj){place(self.P)}",
-        ]
-        if self.differences:
-            out.append(f"  status: differs in {len(self.differences)} calls, first in {self.differences[0]}")
-        if 8 * self.resolution > self.tolerance:
-            out.append(f"  a reference with its x rounded to {self.scalar}: {self.resolution:.1e} sigma")
-        if self.lost:
-            out.append(f"  {self.lost} steps not compared: rounding alone moves the reference further than that")
-        out += [f"  {line}" for line in self.certificate]
-        verdict = "passed" if self.passed else "FAILED"
-        return "\n".join([*out, f"  tolerance {self.tolerance:.0e}: {verdict}"])
-
 
 def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
     """Compile `spec` and compare it with the reference. KfgenError without a compiler; SpecError."""
@@ -116,7 +94,7 @@ def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
     from kfgen.reference import reference
 
     generated = build(spec)
-    kf = load_filters([(spec, generated.files)])[0]
+    kf = load_filters([generated])[0]
     outcome = compare(kf, reference(spec), steps, seed, reference(spec))
     if generated.fixed is None:
         return outcome
@@ -152,7 +130,7 @@ def compare(
                 coarse.displace(scales.rounded)
             calls += 1
             if (ours ^ theirs) & ~Status.REGULARIZED:  # where a pivot is zero depends on the factorisation
-                text = f"{call[0]} of step {row + 1}: {describe(ours)}, reference {describe(theirs)}"
+                text = f"{call.sensor or 'predict'} of step {row + 1}: {describe(ours)}, reference {describe(theirs)}"
                 differences.append(text)
                 errors_differ |= ours >= ERROR or theirs >= ERROR
                 _follow(ref, kf, coarse)
@@ -170,7 +148,7 @@ def compare(
     )  # fmt: skip
 
 
-def _follow(ref: ReferenceFilter, *others: NativeFilter | ReferenceFilter) -> None:
+def _follow(ref: ReferenceFilter, *others: Filter) -> None:
     """Give other filters the estimate of the reference. All modes of a bank go on from the combined one, those of the
     reference too; mu is the reference's."""
     x = ref.x
@@ -180,49 +158,54 @@ def _follow(ref: ReferenceFilter, *others: NativeFilter | ReferenceFilter) -> No
         if P is not None:
             each.set_covariance(P)
         if ref.spec.imm is not None:
-            each.mu = ref.mu  # type: ignore[misc]
+            each.mu = ref.mu
 
 
-# a function's name ("predict" or a sensor), and its keywords
-Call = tuple[str, dict[str, object]]
+@dataclass(frozen=True)
+class Call:
+    """An update of a sensor with z [m], or without a sensor a predict; u [nu], dt in s and mask where they are used."""
+
+    sensor: str | None = None
+    z: Array = field(default_factory=lambda: np.empty(0))
+    u: Array | None = None
+    dt: float | None = None
+    mask: int | None = None
 
 
-def _made(kf: NativeFilter | ReferenceFilter, call: Call) -> int:
-    name, keywords = call
-    made: int = kf.predict(**keywords) if name == "predict" else kf.update(name, **keywords)  # type: ignore[arg-type]
-    return made
+def _made(kf: Filter, call: Call) -> int:
+    if call.sensor is None:
+        return kf.predict(call.u, call.dt)
+    return kf.update(call.sensor, call.z, call.u, call.mask)
 
 
 def _calls(spec: Spec, work: Plan, row: int, random: np.random.Generator) -> list[Call]:
     """The calls of one row in order."""
-    u = {"u": work.u[row]} if spec.inputs else {}
+    u = work.u[row] if spec.inputs else None
     run_time = spec.dt is not None and spec.dt.run_time
     calls: list[Call] = []
     if work.step[row]:
-        calls.append(("predict", {**u, "dt": float(work.dt[row])} if run_time else {**u}))
+        calls.append(Call(u=u, dt=float(work.dt[row]) if run_time else None))
     first = 0
     for i, sensor in enumerate(spec.measurements):
         last = first + len(sensor.components)
         if work.mask[row, i]:
-            keywords: dict[str, object] = {"z": work.z[row, first:last], **u}
-            if sensor.partial and random.random() < 0.2:
-                keywords["mask"] = int(random.integers(0, 1 << (last - first)))
-            calls.append((sensor.name, keywords))
+            masked = sensor.partial and random.random() < 0.2
+            mask = int(random.integers(0, 1 << (last - first))) if masked else None
+            calls.append(Call(sensor.name, work.z[row, first:last], u, mask=mask))
         first = last
     return calls
 
 
 def _rounded(kf: NativeFilter, work: Plan) -> Plan:
     """The same numbers as the scalar type carries them."""
-    scalar, units = kf._value, kf._units
-    z = np.concatenate([units.z[name] for name in kf.sensors]) if kf.sensors else np.empty(0)
+    scalar, units = kf.struct.value, kf.struct.units
     return Plan(
         work.t,
         work.step,
         scalar.to_physical(scalar.to_raw(work.dt, units.dt), units.dt),
         scalar.to_physical(scalar.to_raw(work.u, units.u), units.u),
         work.mask,
-        scalar.to_physical(scalar.to_raw(work.z, z), z),
+        scalar.to_physical(scalar.to_raw(work.z, units.readings), units.readings),
     )
 
 
@@ -235,13 +218,13 @@ class _Scales:
         self._upper = np.triu_indices(n)
         self.pairs = [f"{self.names[i]}, {self.names[j]}" for i, j in zip(*self._upper, strict=True)]
         self._parts = [part_of(ref.model.periods.get(i)) for i in range(n)]
-        dtype = kf._value.dtype
+        dtype = kf.struct.value.dtype
         floating = dtype.kind == "f"
         self._dtype = dtype if floating else np.dtype(np.float64)
-        self._lsb = None if floating else kf._units.x
-        self._P_lsb = 0.0 if floating else kf._units.P
+        self._lsb = None if floating else kf.struct.units.x
+        self._P_lsb = 0.0 if floating else kf.struct.units.P
         self._relative = 8 * float(np.finfo(dtype).eps) if floating else 0.0
-        self._absolute = np.zeros(n) if floating else 4 * kf._units.x
+        self._absolute = np.zeros(n) if floating else 4 * kf.struct.units.x
         self._magnitude = np.abs(ref.x)
         self._variance = np.diag(ref.P).copy()
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from kfgen.budgets import Prediction, exceeded, predict
 from kfgen.emit.data import View
+from kfgen.emit.declarations import Declarations, declarations
 from kfgen.emit.render import render
 from kfgen.emit.view import make_view
 from kfgen.errors import SpecError
@@ -44,6 +46,16 @@ class Generated:
     code: FilterCode
     view: View
     fixed: FixedFilter | None = None
+
+    @property
+    def spec(self) -> Spec:
+        """The spec as it was generated, its scalar with it."""
+        return self.code.model.spec
+
+    @cached_property
+    def declarations(self) -> Declarations:
+        """What the header declares."""
+        return declarations(self.view)
 
 
 def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judge: bool = True) -> Generated:

@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from typing import Any
 
 from kfgen.errors import KfgenError
+from kfgen.scalar_names import KNOWN, is_scalar
 from kfgen.spec.types import Spec
 
 _UPDATES = {"ud": "bierman", "full": "joseph", "sqrt": None}  # covariance -> its default form of update
-_Q = re.compile(r"q(\d{1,2})\.(\d{1,2})", re.ASCII)
-
-
-def check_scalar(scalar: str) -> str:
-    """`scalar` if it is float, double or a q<m>.<n> with m + n = 32 and 8 <= n <= 24; else KfgenError."""
-    if scalar in ("float", "double"):
-        return scalar
-    match = _Q.fullmatch(scalar)
-    if match and int(match[1]) + int(match[2]) == 32 and 8 <= int(match[2]) <= 24:
-        return scalar
-    raise KfgenError(f"scalar `{scalar}` is unknown; write float, double, or q<m>.<n> with m + n = 32 and 8 <= n <= 24")
 
 
 def override(spec: Spec, scalar: str | None = None, **changes: Any) -> Spec:
@@ -35,8 +24,8 @@ def override(spec: Spec, scalar: str | None = None, **changes: Any) -> Spec:
     """
     if scalar is not None:
         changes["scalar"] = scalar
-    if "scalar" in changes:
-        check_scalar(changes["scalar"])
+    if "scalar" in changes and not is_scalar(changes["scalar"]):
+        raise KfgenError(f"scalar `{changes['scalar']}` is unknown; {KNOWN}")
     changed: Spec = _replace(spec, changes, "spec")
     chosen = changes.get("filter")
     if isinstance(chosen, Mapping) and "update" not in chosen and {"type", "covariance"} & set(chosen):

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kfgen.commands.options import aligned, example, load_spec, scalar_option
+from kfgen.commands.options import example, load_spec, scalar_option
+from kfgen.commands.progress import progress
+from kfgen.commands.tables import Notes, Part, Paths, Table, show
 from kfgen.errors import KfgenError, Mistake, SpecError
 from kfgen.layouts import Package, arrange, layouts
+from kfgen.scalar_names import is_fixed
 
 if TYPE_CHECKING:
     from kfgen.generate import Generated
@@ -86,7 +89,7 @@ def build(
     from kfgen.files import write_all
 
     write_all({path: text for each in built for path, text in each.files.items()})
-    click.echo(table(built))
+    show(*report(built))
 
 
 def generate_all(
@@ -112,19 +115,22 @@ def generate_all(
     from kfgen.generate import build as generate
 
     built = []
-    for spec in specs:
-        try:
-            generated = generate(spec, log=_read(log, spec))
-            texts = dict(generated.files)
-            if selftest:
-                from kfgen.selftest import selftest as recorded
+    long = len(specs) > 1 or any(is_fixed(spec.scalar) for spec in specs)
+    with progress(len(specs), long) as advance:
+        for done, spec in enumerate(specs):
+            advance(done, spec.name)
+            try:
+                generated = generate(spec, log=_read(log, spec))
+                texts = dict(generated.files)
+                if selftest:
+                    from kfgen.selftest import selftest as recorded
 
-                texts |= recorded(spec, generated)
-            if layout != "plain":
-                texts = arrange(layout, _package(spec, generated, texts, layout))
-            built.append(Built(spec, generated, texts, directory / spec.name))
-        except SpecError as error:
-            mistakes += error.mistakes
+                    texts |= recorded(spec, generated)
+                if layout != "plain":
+                    texts = arrange(layout, _package(spec, generated, texts, layout))
+                built.append(Built(spec, generated, texts, directory / spec.name))
+            except SpecError as error:
+                mistakes += error.mistakes
     if mistakes:
         raise SpecError(mistakes)
     return built
@@ -133,27 +139,25 @@ def generate_all(
 def _package(spec: Spec, generated: Generated, texts: Mapping[str, str], layout: str) -> Package:
     """What a layout arranges."""
     from kfgen.cost.advice import recommended_flags
-    from kfgen.native.header import parse
     from kfgen.spec.constants import value
 
-    header_text = texts[f"{spec.name}.h"]
-    header = parse(header_text, spec.name)
+    declared = generated.declarations
     functions = ["predict", *(f"update_{sensor.name}" for sensor in spec.measurements)]
     selftest = " --selftest" if f"{spec.name}_selftest.c" in texts else ""
     return Package(
         view=generated.view,
         sources=texts,
         command=f"{generated.view.command}{selftest} --layout {layout}",
-        flags=tuple(recommended_flags(header_text)),
+        flags=tuple(recommended_flags(generated.view)),
         step=1.0 if spec.dt is None else float(value(spec.dt.nominal.tree, spec)),
-        run_time=header.takes("predict", "dt"),
-        takes_inputs=tuple(name for name in functions if header.takes(name, "u")),
+        run_time=declared.takes("predict", "dt"),
+        takes_inputs=tuple(name for name in functions if declared.takes(name, "u")),
     )
 
 
 def _read(log: Path | None, spec: Spec) -> Log | None:
     """The log that fixed point takes ranges from; other scalars have no use for one."""
-    if log is None or spec.scalar in ("float", "double"):
+    if log is None or not is_fixed(spec.scalar):
         return None
     from kfgen.logs import read
 
@@ -194,39 +198,28 @@ def _lines(text: str) -> list[str]:
     return [f"{line}\n" for line in text.split("\n")[:-1]] + [line for line in text.split("\n")[-1:] if line]
 
 
-# --- the table
+# --- what is shown
 
 
-def table(built: Sequence[Built]) -> str:
-    """Per filter its sizes, RAM and files, and each function's flash, stack and arithmetic, in aligned columns."""
-    rows = [("filter", "size", "RAM", "function", "flash", "stack", "operations", "files")]
-    notes: list[str] = []
+def report(built: Sequence[Built]) -> list[Part]:
+    """Per filter its sizes and RAM, per function its flash, stack and arithmetic; then remarks, and the files."""
+    filters = [("filter", "scalar", "size", "RAM")]
+    functions = [("filter", "function", "flash", "stack", "operations")]
+    notes: list[tuple[str, str]] = []
     for each in built:
-        sizes, summary = _sizes(each.spec), each.generated.summary
+        name, summary = each.spec.name, each.generated.summary
         forms, found = summary.forms, summary.prediction
         flash, stack = (found.flash, found.stack) if found is not None else ({}, {})
-        functions = [
-            (
-                _with_form(name, forms), _about(flash.get(name)), _about(stack.get(name)),
-                _operations(counts) if counts or name not in forms else "",
-            )
-            for name, counts in summary.rows
-        ]
-        files = [str(path) for path in each.files]
-        for i in range(max(len(sizes), len(functions), len(files))):
-            rows.append(
-                (
-                    each.spec.name if i == 0 else each.spec.scalar if i == 1 else "",
-                    sizes[i] if i < len(sizes) else "",
-                    f"{summary.ram} B" if i == 0 else "",
-                    *(functions[i] if i < len(functions) else ("", "", "", "")),
-                    files[i] if i < len(files) else "",
-                )
-            )
-        notes += [f"{each.spec.name}: {note}" for note in summary.notes]
+        filters.append((name, each.spec.scalar, _sizes(each.spec), f"{summary.ram} B"))
+        for function, counts in summary.rows:
+            operations = _operations(counts) if counts or function not in forms else ""
+            about = (_about(flash.get(function)), _about(stack.get(function)))
+            functions.append((name, _with_form(function, forms), *about, operations))
+        notes += [(name, note) for note in summary.notes]
         if found is not None:
-            notes.append(f"{each.spec.name}: {_predicted(each.spec, found.totals)}")
-    return "\n".join([*aligned(rows, right=(2, 4, 5)), *notes])
+            notes.append((name, _predicted(each.spec, found.totals)))
+    files = [str(path) for each in built for path in each.files]
+    return [Table(filters, right=(3,)), "", Table(functions, right=(2, 3)), "", Notes(notes), "", Paths(files)]
 
 
 _TITLES = {"flash": "flash", "ram": "RAM", "stack": "stack"}
@@ -247,14 +240,14 @@ def _predicted(spec: Spec, totals: Mapping[str, int]) -> str:
     return f"{', '.join(parts)} on a Cortex-M4F, as predicted; `kfgen cost` measures"
 
 
-def _sizes(spec: Spec) -> list[str]:
+def _sizes(spec: Spec) -> str:
     def plural(number: int, what: str) -> str:
         return f"{number} {what}{'s' if number != 1 else ''}"
 
     sizes = [plural(len(spec.states), "state")]
     if spec.inputs:
         sizes.append(plural(len(spec.inputs), "input"))
-    return [*sizes, *(f"{sensor.name}: {len(sensor.components)}" for sensor in spec.measurements)]
+    return ", ".join([*sizes, *(f"{sensor.name}: {len(sensor.components)}" for sensor in spec.measurements)])
 
 
 def _with_form(name: str, forms: Mapping[str, str]) -> str:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from kfgen.commands.options import example, load_spec, scalar_option, spec_argument
+from kfgen.commands.tables import Part, Table, Verdict, show
+
+if TYPE_CHECKING:
+    from kfgen.check import Outcome
 
 
 @click.command(
@@ -26,5 +31,30 @@ def check(spec: Path, scalar: str | None) -> None:
     from kfgen.check import check as compare
 
     outcome = compare(load_spec(spec, scalar))
-    click.echo(outcome.text())
+    show(*report(outcome))
     sys.exit(0 if outcome.passed else 1)
+
+
+def report(outcome: Outcome) -> list[Part]:
+    """The result: the largest errors and where they were, what is to be known beside, the verdict."""
+    remarks = []
+    if outcome.differences:
+        remarks.append(f"status: differs in {len(outcome.differences)} calls, first in {outcome.differences[0]}")
+    if 8 * outcome.resolution > outcome.tolerance:
+        remarks.append(f"a reference with its x rounded to {outcome.scalar}: {outcome.resolution:.1e} sigma")
+    if outcome.lost:
+        remarks.append(f"{outcome.lost} steps not compared: rounding alone moves the reference further than that")
+    return [
+        f"{outcome.name} ({outcome.scalar}): {outcome.steps} steps, {outcome.calls} calls against the reference",
+        Table(
+            [
+                ["quantity", "largest error", "of", "where"],
+                ["x", f"{outcome.x.error:.1e}", "sigma", outcome.x.where],
+                ["P", f"{outcome.P.error:.1e}", "sqrt(P_ii P_jj)", outcome.P.where],
+            ],
+            right=(1,),
+        ),
+        *remarks,
+        *outcome.certificate,
+        Verdict(f"tolerance {outcome.tolerance:.0e}: {'passed' if outcome.passed else 'FAILED'}", outcome.passed),
+    ]

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kfgen.commands.options import aligned, example, load_spec, scalar_option, spec_argument
+from kfgen.commands.options import example, load_spec, scalar_option, spec_argument
+from kfgen.commands.progress import progress
+from kfgen.commands.tables import Part, Table, show
 
 if TYPE_CHECKING:
     from kfgen.cost import Cost
@@ -71,20 +73,25 @@ def cost(
 
     processor = target_of(target)
     loaded = load_spec(spec, scalar)
-    data = simulate(loaded, rows) if log is None else logs.read(log, loaded)
-    files = build(loaded, judge=False).files
-    plain = measure(loaded, files, data, target, cflags.split(), compiler=compiler, rows=rows)
-    found = {"measured": plain}
-    flags = recommended_flags(files[f"{loaded.name}.h"])
-    if flags and processor.takes_gcc_flags(compiler):
-        more = [*flags, *cflags.split()]
-        found["recommended"] = measure(loaded, files, data, target, more, compiler=compiler, rows=rows)
+    with progress(4) as advance:
+        advance(0, "log")
+        data = simulate(loaded, rows) if log is None else logs.read(log, loaded)
+        advance(1, "filter")
+        generated = build(loaded, judge=False)
+        advance(2, "measuring")
+        plain = measure(generated, data, target, cflags.split(), compiler=compiler, rows=rows)
+        found = {"measured": plain}
+        flags = recommended_flags(generated.view)
+        if flags and processor.takes_gcc_flags(compiler):
+            advance(3, "measuring with the recommended flags")
+            more = [*flags, *cflags.split()]
+            found["recommended"] = measure(generated, data, target, more, compiler=compiler, rows=rows)
     over = exceeded(loaded, list(found.values())[-1])
     if as_json:
         click.echo(json.dumps(_plain(found, mhz, over, min(rows, data.rows), log), indent=2))
     else:
         source = "a simulated log" if log is None else str(log)
-        click.echo(text(processor, found, mhz, f"{min(rows, data.rows)} rows of {source}"))
+        show(*report(processor, found, mhz, f"{min(rows, data.rows)} rows of {source}"))
     for message in over:
         click.echo(f"kfgen: {message}", err=True)
     sys.exit(1 if over else 0)
@@ -115,29 +122,30 @@ def _plain(
     }  # fmt: skip
 
 
-def text(target: Target, found: Mapping[str, Cost], mhz: float | None, source: str) -> str:
+def report(target: Target, found: Mapping[str, Cost], mhz: float | None, source: str) -> list[Part]:
     """The tables, one for each set of flags."""
     first = found["measured"]
-    lines = [f"{first.name} ({first.scalar}) on {target.title}, over {source}", f"compiled by {first.compiler}"]
-    lines += [f"note: {first.remark}"] if first.remark else []
+    parts: list[Part] = [f"{first.name} ({first.scalar}) on {target.title}, over {source}"]
+    parts.append(f"compiled by {first.compiler}")
+    parts += [f"note: {first.remark}"] if first.remark else []
     for cost in found.values():
         why = "recommended in the header" if len(found) > 1 and cost is not first else ""
         flags = " ".join(cost.flags)
         usual = "with -O2 -fno-math-errno"
         head = f"{usual}, {why}: {flags}" if why else f"{usual} {flags}".rstrip()
-        lines += ["", head, *_table(cost, mhz)]
-        lines.append(
+        parts += ["", head, _table(cost, mhz)]
+        parts.append(
             f"flash {cost.flash} bytes, {cost.flash_linked} with the library functions it calls; "
             f"RAM {cost.ram} bytes a filter; stack {cost.stack} bytes"
         )
         if cost.errors:
-            lines.append(f"{cost.errors} calls returned an error")
+            parts.append(f"{cost.errors} calls returned an error")
     if mhz is not None:
-        lines += ["", f"us: estimated from cycles at {mhz:g} MHz, without caches and wait states"]
-    return "\n".join(lines)
+        parts += ["", f"us: estimated from cycles at {mhz:g} MHz, without caches and wait states"]
+    return parts
 
 
-def _table(cost: Cost, mhz: float | None) -> list[str]:
+def _table(cost: Cost, mhz: float | None) -> Table:
     rows: list[list[str]] = [["function", "calls", cost.unit, "worst", "us, estimate", "flash", "stack"]]
     for name, each in cost.functions.items():
         mean = "not called" if each.mean is None else f"{each.mean:.1f}".removesuffix(".0")
@@ -149,7 +157,7 @@ def _table(cost: Cost, mhz: float | None) -> list[str]:
     rows.append(["one of each", "", f"{cost.step:.0f}", "", _time(total, mhz), "", ""])
     if mhz is None:
         rows = [[*row[:4], *row[5:]] for row in rows]
-    return aligned(rows, right=range(1, len(rows[0])))
+    return Table(rows, right=range(1, len(rows[0])))
 
 
 def _time(cycles: float | None, mhz: float | None) -> str:

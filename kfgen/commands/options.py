@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,16 +29,3 @@ def load_spec(path: Path, scalar: str | None = None) -> Spec:
 def example(*lines: str) -> str:
     """An epilog with examples, each on a line of its own."""
     return "\b\nExample:\n" + "\n".join(f"  {line}" for line in lines)
-
-
-def aligned(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> list[str]:
-    """Text rows as lines with aligned columns, the first row underlined; columns in `right` to the right."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    rule = ["-" * width for width in widths]
-    return [
-        "  ".join(
-            cell.rjust(width) if i in right else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in [rows[0], rule, *rows[1:]]
-    ]

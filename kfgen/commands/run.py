@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.commands.options import example, load_spec, scalar_option, spec_argument
+from kfgen.commands.progress import progress
+from kfgen.commands.tables import Table, on_terminal, show
+from kfgen.scalar_names import FLOAT
 
 if TYPE_CHECKING:
     from kfgen.native.run import RunResult
@@ -56,8 +57,8 @@ def run(spec: Path, log: Path, out: Path | None, plot: Path | None, scalar: str 
     if data.ignored:
         click.echo(f"kfgen: ignored columns of {log}: {', '.join(data.ignored)}", err=True)
     kf = native.compile(loaded)
-    with _progress(data.rows) as progress:
-        result = kf.run(data, progress)
+    with progress(data.rows, data.rows >= LONG) as advance:
+        result = kf.run(data, lambda done, rows: advance(done, "running"))
     _report(result)
     if out is not None:
         logs.write(out, columns(loaded, result))
@@ -71,7 +72,7 @@ def run(spec: Path, log: Path, out: Path | None, plot: Path | None, scalar: str 
 
 def columns(spec: Spec, result: RunResult) -> dict[str, NDArray[np.generic]]:
     """A run as columns of a CSV file; numbers keep the filter's own precision."""
-    own = np.float32 if spec.scalar == "float" else np.float64  # so that they print as short as they are
+    own = np.float32 if spec.scalar == FLOAT else np.float64  # so that they print as short as they are
     out: dict[str, NDArray[np.generic]] = {"t": result.t}
     names = [state.name for state in spec.states]
     out |= {f"x.{name}": result.x[:, i].astype(own) for i, name in enumerate(names)}
@@ -84,18 +85,13 @@ def columns(spec: Spec, result: RunResult) -> dict[str, NDArray[np.generic]]:
 
 
 def _report(result: RunResult) -> None:
-    """What the filter refused, and what it warned of, on stderr."""
-    rows = len(result.t)
-    for errors, word in ((True, "error"), (False, "warning")):
+    """What the filter refused, and what it warned of, on stderr: a table for a person, a line each otherwise."""
+    rows, found = len(result.t), []
+    for errors, kind in ((True, "error"), (False, "warning")):
         for function, counts in result.counts(errors).items():
-            text = ", ".join(f"{flag.name} {number}x" for flag, number in counts.items())
-            click.echo(f"kfgen: {function}: {word} {text} in {rows} rows", err=True)
-
-
-@contextmanager
-def _progress(rows: int) -> Iterator[Callable[[int, int], None] | None]:
-    if rows < LONG or not sys.stderr.isatty():
-        yield None
+            found.append((function, kind, ", ".join(f"{flag.name} {number}x" for flag, number in counts.items())))
+    if found and on_terminal(err=True):
+        show(Table([("function", "", f"times in {rows} rows"), *found]), err=True)
         return
-    with click.progressbar(length=rows, label="running", file=sys.stderr) as bar:
-        yield lambda done, _: bar.update(done - bar.pos)
+    for function, kind, text in found:
+        click.echo(f"kfgen: {function}: {kind} {text} in {rows} rows", err=True)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
+from kfgen.emit.data import View
 
 
-def recommended_flags(header: str) -> list[str]:
+def recommended_flags(view: View) -> list[str]:
     """Those for the filter's file; [] if none."""
-    found = re.search(r"^ \*\s+(-O\S.*)$", header, re.MULTILINE)
-    return found[1].split() if found else []
+    lines = (line.strip() for line in view.advice)
+    return next((line.split() for line in lines if line.startswith("-O")), [])

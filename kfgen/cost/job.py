@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kfgen.emit.declarations import Declarations
 from kfgen.errors import KfgenError
 from kfgen.logs import Log, as_log
-from kfgen.native.header import Header, parse
+from kfgen.native.emitted import Emitted
 from kfgen.native.run import plan
 from kfgen.native.values import Units, value_of
 from kfgen.spec.types import Spec
@@ -63,51 +64,47 @@ class Job:
         return "\n".join(lines) + "\n"
 
 
-def make_job(spec: Spec, files: Mapping[str, str], log: Log, rows: int = ROWS) -> Job:
+def make_job(emitted: Emitted, log: Log, rows: int = ROWS) -> Job:
     """The first `rows` rows of a log as calls, as `kfgen run` makes them, and a prediction before the first row where
     the step is given at run time. KfgenError for a log that does not fit."""
-    header = parse(files[f"{spec.name}.h"], spec.name)
+    spec, declared = emitted.spec, emitted.declarations
     log = as_log(log, spec)
     log = Log({name: column[:rows] for name, column in log.columns.items()}, min(rows, log.rows), log.source)
-    functions = {"predict": True}
+    functions, sensors = {"predict": True}, {}
     for sensor in spec.measurements:
-        functions[f"update_{sensor.name}"] = True
-        if header.has(f"update_{sensor.name}_masked"):
-            functions[f"update_{sensor.name}_masked"] = False
-    sources = {f"{spec.name}.{ending}": files[f"{spec.name}.{ending}"] for ending in ("h", "c")}
+        for function, counts in ((f"update_{sensor.name}", True), (f"update_{sensor.name}_masked", False)):
+            if declared.has(function):
+                functions[function], sensors[function] = counts, sensor.name
+    sources = {f"{spec.name}.{ending}": emitted.files[f"{spec.name}.{ending}"] for ending in ("h", "c")}
+    calls = {function: _call(declared, function, sensors.get(function, "")) for function in ("init", *functions)}
     return Job(
-        spec.name, spec.scalar, sources, functions, _variables(spec, header, functions),
-        _calls(spec.name, header, ["init", *functions]), _steps(spec, header, log), log.rows,
+        spec.name, spec.scalar, sources, functions, _variables(spec, declared, functions), calls,
+        _steps(spec, declared, log), log.rows,
     )  # fmt: skip
 
 
-def _variables(spec: Spec, header: Header, functions: Mapping[str, bool]) -> dict[str, str]:
-    taken = {argument for function in functions for argument in header.functions[f"{spec.name}_{function}"]}
+def _variables(spec: Spec, declared: Declarations, functions: Mapping[str, bool]) -> dict[str, str]:
+    taken = {argument for function in functions for argument in declared.functions[function]}
     kinds = {"u": f"{spec.name}_inputs_t", "dt": f"{spec.name}_real_t", "mask": "uint32_t"}
     variables = {name: kind for name, kind in kinds.items() if name in taken}
     return variables | {f"z_{sensor.name}": f"{spec.name}_{sensor.name}_t" for sensor in spec.measurements}
 
 
-def _calls(name: str, header: Header, functions: Sequence[str]) -> dict[str, str]:
-    """function -> the C expression that calls it."""
-    calls = {}
-    for function in functions:
-        sensor = function.removeprefix("update_")
-        sensor = sensor if header.declares(f"{sensor}_t") else sensor.removesuffix("_masked")
-        p = f"{name}_kfgen_"
-        spelled = {"kf": f"&{p}kf", "u": f"&{p}u", "dt": f"{p}dt", "mask": f"{p}mask", "z": f"&{p}z_{sensor}"}
-        arguments = header.functions[f"{name}_{function}"]
-        if any(argument not in spelled for argument in arguments):
-            raise KfgenError(f"{name}_{function} has an argument that is not understood: {', '.join(arguments)}")
-        calls[function] = f"{name}_{function}({', '.join(spelled[a] for a in arguments)})"
-    return calls
+def _call(declared: Declarations, function: str, sensor: str) -> str:
+    """The C expression that calls a function, of a sensor if it is an update."""
+    name, arguments = declared.prefix, declared.functions[function]
+    p = f"{name}_kfgen_"
+    spelled = {"kf": f"&{p}kf", "u": f"&{p}u", "dt": f"{p}dt", "mask": f"{p}mask", "z": f"&{p}z_{sensor}"}
+    if any(argument not in spelled for argument in arguments):
+        raise KfgenError(f"{name}_{function} has an argument that is not understood: {', '.join(arguments)}")
+    return f"{name}_{function}({', '.join(spelled[a] for a in arguments)})"
 
 
-def _steps(spec: Spec, header: Header, log: Log) -> list[Step]:
+def _steps(spec: Spec, declared: Declarations, log: Log) -> list[Step]:
     work = plan(spec, log)
     if spec.dt is not None and spec.dt.run_time and log.rows:
         work.dt[0], work.step[0] = BEFORE, 1
-    scalar = value_of(header)
+    scalar = value_of(declared)
     units = Units(spec, scalar)
     steps: list[Step] = []
     for row in range(log.rows):

@@ -38,6 +38,8 @@ class Data:
 
 @dataclass(frozen=True)
 class FunctionView:
+    name: str  # without the prefix
+    arguments: tuple[str, ...]  # their names
     doc: str
     comment: tuple[str, ...]  # the doc of a private function
     parameters: tuple[str, ...]

@@ -42,6 +42,8 @@ class FunctionMaker:
         prototype = self._prototype(f)
         cost = cost_of(f) if is_counted(f) else ""
         return FunctionView(
+            name=f.name,
+            arguments=tuple(a.name for a in f.arguments),
             doc=f.doc,
             comment=tuple(comment(f.doc)),
             parameters=self._parameters(f),

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import cffi
 
+from kfgen.emit.declarations import Declarations
 from kfgen.errors import KfgenError
-from kfgen.native import driver, header
+from kfgen.native import driver
 from kfgen.native.compiler import build
+from kfgen.native.emitted import Emitted
 from kfgen.native.filter import NativeFilter
 from kfgen.native.run import RunResult
+from kfgen.native.struct import Struct
 from kfgen.override import override
 from kfgen.spec.types import Spec
 
-__all__ = ["NativeFilter", "RunResult", "compile", "compile_many", "load_filters"]
+__all__ = ["Emitted", "NativeFilter", "RunResult", "compile", "compile_many", "load_filters"]
 
 SpecOrPath = Spec | str | os.PathLike[str]
 
@@ -46,48 +49,44 @@ def compile_many(
     Arguments as for `compile`; scalar and overrides hold for all. Specs that share a name are given different
     prefixes (`vehicle`, `vehicle_2`), since they meet in one library.
     """
-    from kfgen.generate import generate
+    from kfgen.generate import build as generate
 
-    pairs = []
+    filters = []
     taken: set[str] = set()
     for each in specs:
         spec = _renamed(override(_loaded(each), scalar, **overrides), taken)
         taken.add(spec.name.upper())
-        pairs.append((spec, generate(spec)))
-    return load_filters(pairs, flags=flags)
+        filters.append(generate(spec))
+    return load_filters(filters, flags=flags)
 
 
-def load_filters(
-    filters: Sequence[tuple[Spec, Mapping[str, str]]], *, flags: Sequence[str] | None = None
-) -> list[NativeFilter]:
-    """Filters whose C is at hand: pairs of a spec and its files (`<name>.h`, `<name>.c`), names distinct."""
+def load_filters(filters: Sequence[Emitted], *, flags: Sequence[str] | None = None) -> list[NativeFilter]:
+    """Filters that are generated already, compiled into one library; their names are distinct."""
     if not filters:
         return []
     texts: dict[str, str] = {}
-    headers: list[header.Header] = []
-    for spec, files in filters:
-        wanted = {name: files[name] for name in (f"{spec.name}.h", f"{spec.name}.c")}
+    for each in filters:
+        name = each.spec.name
+        wanted = {file: each.files[file] for file in (f"{name}.h", f"{name}.c")}
         if wanted.keys() & texts.keys():
-            raise KfgenError(f"two filters are named {spec.name}; they cannot share a library")
-        parsed = header.parse(wanted[f"{spec.name}.h"], spec.name)
-        headers.append(parsed)
+            raise KfgenError(f"two filters are named {name}; they cannot share a library")
         texts |= wanted
-        texts[f"{spec.name}_kfgen_run.c"] = driver.source(spec, parsed)
-    library = build(texts, flags)
-    return [_load(spec, parsed, str(library)) for (spec, _), parsed in zip(filters, headers, strict=True)]
+        texts[f"{name}_kfgen_run.c"] = driver.source(each.spec, each.declarations)
+    library = str(build(texts, flags))
+    return [_load(each.spec, each.declarations, library) for each in filters]
 
 
-def _load(spec: Spec, parsed: header.Header, library: str) -> NativeFilter:
+def _load(spec: Spec, declared: Declarations, library: str) -> NativeFilter:
     ffi = cffi.FFI()
-    ffi.cdef(parsed.cdef + "\n" + driver.declarations(spec.name))
+    ffi.cdef(declared.text + "\n" + driver.declarations(spec.name))
     try:
         lib = ffi.dlopen(library)
     except OSError as error:
         raise KfgenError(f"the compiled filter {spec.name} could not be loaded: {error}") from None
     seen, compiled = ffi.sizeof(f"{spec.name}_t"), getattr(lib, f"{spec.name}_kfgen_size")()
-    if seen != compiled:  # a declaration was misread; going on would corrupt memory
-        raise KfgenError(f"{spec.name}_t has {compiled} bytes in C, but {seen} by its header")
-    return NativeFilter(spec, parsed, ffi, lib)
+    if seen != compiled:  # going on would corrupt memory
+        raise KfgenError(f"{spec.name}_t has {compiled} bytes in C, but {seen} as it is declared")
+    return NativeFilter(spec, Struct(spec, declared, ffi, lib))
 
 
 def _loaded(spec: SpecOrPath) -> Spec:

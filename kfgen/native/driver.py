@@ -7,7 +7,7 @@ from importlib.resources import files
 
 import jinja2
 
-from kfgen.native.header import Header
+from kfgen.emit.declarations import Declarations
 from kfgen.spec.types import Spec
 
 
@@ -16,8 +16,8 @@ def declarations(name: str) -> str:
     return f"size_t {name}_kfgen_size(void);\n{_signature(name)};\n"
 
 
-def source(spec: Spec, header: Header) -> str:
-    """The driver's C text for a filter; which arguments its functions take is read from the header."""
+def source(spec: Spec, declared: Declarations) -> str:
+    """The driver's C text for a filter; its functions are called with what they take."""
     name = spec.name
     sensors, first = [], 0
     for sensor in spec.measurements:
@@ -28,9 +28,9 @@ def source(spec: Spec, header: Header) -> str:
                 "m": m,
                 "first": first,
                 "full": (1 << m) - 1,
-                "u": header.takes(f"update_{sensor.name}", "u"),
-                "masked": header.has(f"update_{sensor.name}_masked"),
-                "masked_u": header.takes(f"update_{sensor.name}_masked", "u"),
+                "u": declared.takes(f"update_{sensor.name}", "u"),
+                "masked": declared.has(f"update_{sensor.name}_masked"),
+                "masked_u": declared.takes(f"update_{sensor.name}_masked", "u"),
             }
         )
         first += m
@@ -42,10 +42,10 @@ def source(spec: Spec, header: Header) -> str:
         nz=first,
         sensors=sensors,
         has_u=bool(spec.inputs)
-        and (header.takes("predict", "u") or any(each["u"] or each["masked_u"] for each in sensors)),
-        predict_u=header.takes("predict", "u"),
-        predict_dt=header.takes("predict", "dt"),
-        covariance=header.has("get_covariance"),
+        and (declared.takes("predict", "u") or any(each["u"] or each["masked_u"] for each in sensors)),
+        predict_u=declared.takes("predict", "u"),
+        predict_dt=declared.takes("predict", "dt"),
+        covariance=declared.has("get_covariance"),
         modes=len(spec.imm.modes) if spec.imm else 0,
     )
 

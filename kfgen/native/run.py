@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.errors import KfgenError
 from kfgen.logs import Log, Source, as_log
+from kfgen.native.struct import Struct
 from kfgen.native.values import Array
 from kfgen.spec.constants import value
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status
-
-if TYPE_CHECKING:
-    from kfgen.native.filter import NativeFilter
 
 CHUNK = 1 << 15
 """Rows per call of the C driver: long enough to cost nothing, short enough for a progress bar and Ctrl-C."""
@@ -112,26 +110,24 @@ def _held(column: Array, name: str, source: str) -> Array:
     return column[last]
 
 
-def run(kf: NativeFilter, source: Source, progress: Callable[[int, int], None] | None = None) -> RunResult:
-    """Run `kf` over a log (a path, a mapping of columns, or a Log), on from its present state.
+def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int], None] | None = None) -> RunResult:
+    """Run the filter of a struct over a log (a path, a mapping of columns, or a Log), on from its present state.
 
     See `plan` for what is done in a row. The filter's errors are in the result, none is raised. `progress` is
     called with (rows done, rows) now and then. KfgenError for a log that does not fit the spec.
     """
-    spec = kf.spec
     log = as_log(source, spec)
     work = plan(spec, log, _fixed_step(spec))
-    rows, n, sensors = log.rows, len(kf.states), len(spec.measurements)
+    rows, n, sensors = log.rows, len(spec.states), len(spec.measurements)
     modes = len(spec.imm.modes) if spec.imm else 0
-    scalar, units = kf._value, kf._units
+    scalar, units = struct.value, struct.units
 
-    z_units = np.concatenate([units.z[name] for name in kf.sensors]) if sensors else np.empty(0)
     arrays: dict[str, NDArray[Any]] = {
         "step": work.step,
         "dt": scalar.to_raw(work.dt, units.dt),
         "u": scalar.to_raw(work.u, units.u),
         "mask": work.mask.copy(),
-        "z": scalar.to_raw(work.z, z_units),
+        "z": scalar.to_raw(work.z, units.readings),
         "x": np.zeros((rows, n), scalar.dtype),
         "var": np.zeros((rows, n), scalar.dtype),
         "nis": np.zeros((rows, sensors), scalar.dtype),
@@ -140,19 +136,19 @@ def run(kf: NativeFilter, source: Source, progress: Callable[[int, int], None] |
     }
     if not scalar.representable(np.concatenate([work.u.ravel(), work.z.ravel(), work.dt])):
         _refuse(work, arrays, spec)
-    _call(kf, arrays, rows, progress)
+    _call(struct, arrays, rows, progress)
 
     nis = scalar.to_physical(arrays["nis"], units.one)
     status: NDArray[np.uint32] = arrays["status"]
     updated = (arrays["mask"] != 0) & (status[:, 1:] < ERROR)
-    functions = ["predict", *(f"update_{name}" for name in kf.sensors)]
+    functions = ["predict", *(f"update_{name}" for name in units.z)]
     return RunResult(
         t=work.t,
         x=scalar.to_physical(arrays["x"], units.x),
         var=scalar.to_physical(arrays["var"], np.diag(units.P))
-        if kf._header.has("get_covariance")
+        if struct.has("get_covariance")
         else np.full((rows, n), np.nan),
-        nis={name: np.where(updated[:, i], nis[:, i], np.nan) for i, name in enumerate(kf.sensors)},
+        nis={name: np.where(updated[:, i], nis[:, i], np.nan) for i, name in enumerate(units.z)},
         status=np.bitwise_or.reduce(status, axis=1),
         calls={function: status[:, i] for i, function in enumerate(functions)},
         mu=scalar.to_physical(arrays["mu"], units.one) if modes else None,
@@ -160,23 +156,23 @@ def run(kf: NativeFilter, source: Source, progress: Callable[[int, int], None] |
 
 
 def _call(
-    kf: NativeFilter,
+    struct: Struct,
     arrays: Mapping[str, NDArray[Any]],
     rows: int,
     progress: Callable[[int, int], None] | None,
 ) -> None:
-    ffi, function = kf._ffi, getattr(kf._lib, f"{kf.name}_kfgen_run")
+    ffi, function = struct.ffi, getattr(struct.lib, f"{struct.name}_kfgen_run")
     types = {"step": "uint8_t *", "mask": "uint32_t *", "status": "uint32_t *"}
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     for first in range(0, rows, CHUNK):
         count = min(CHUNK, rows - first)
         pointers = [
-            ffi.from_buffer(types.get(name, f"{kf.name}_real_t *"), array[first : first + count])
+            ffi.from_buffer(types.get(name, f"{struct.name}_real_t *"), array[first : first + count])
             if array.size
             else ffi.NULL
             for name, array in contiguous.items()
         ]
-        function(kf._kf, count, *pointers)
+        function(struct.data, count, *pointers)
         if progress:
             progress(first + count, rows)
 

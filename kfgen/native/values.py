@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kfgen.emit.declarations import Declarations
 from kfgen.errors import KfgenError
-from kfgen.native.header import Header
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -43,8 +44,8 @@ class Value(ABC):
 class Floating(Value):
     """float and double: the physical value; NaN and infinity are passed on for the filter to refuse."""
 
-    def __init__(self, dtype: type[np.floating[Any]]) -> None:
-        self.dtype = np.dtype(dtype)
+    def __init__(self, dtype: np.dtype[Any]) -> None:
+        self.dtype = dtype
 
     def unit(self, name: str) -> float:
         return 1.0
@@ -67,20 +68,16 @@ class Floating(Value):
 class Fixed(Value):
     """q<m>.<n>: an int32 of the quantity's least significant bit; rounded and saturated on the way in."""
 
-    def __init__(self, header: Header) -> None:
+    def __init__(self, units: Mapping[str, float], fraction_bits: int) -> None:
         self.dtype = np.dtype(np.int32)
-        self._macros = header.macros
-        self._prefix = header.prefix.upper()
-        self._fraction_bits = int(self._macro("FRACTION_BITS"))
-
-    def _macro(self, name: str) -> float:
-        try:
-            return self._macros[f"{self._prefix}_{name}"]
-        except KeyError:
-            raise KfgenError(f"the emitted header does not define {self._prefix}_{name}") from None
+        self._units = units
+        self._fraction_bits = fraction_bits
 
     def unit(self, name: str) -> float:
-        return self._macro(f"{name.upper()}_LSB")
+        try:
+            return self._units[name.upper()]
+        except KeyError:
+            raise KfgenError(f"the filter's header has no {name.upper()}_LSB") from None
 
     @property
     def one(self) -> float:
@@ -98,15 +95,11 @@ class Fixed(Value):
         return np.asarray(raw).astype(np.float64) * unit
 
 
-def value_of(header: Header) -> Value:
-    """The scalar type a header was written for."""
-    if header.real == "float":
-        return Floating(np.float32)
-    if header.real == "double":
-        return Floating(np.float64)
-    if header.real == "int32_t":
-        return Fixed(header)
-    raise KfgenError(f"the emitted header has an unknown scalar type {header.real}")
+def value_of(declared: Declarations) -> Value:
+    """The scalar type a filter was written for."""
+    if declared.fraction_bits is not None:
+        return Fixed(declared.units, declared.fraction_bits)
+    return Floating(np.dtype({"float": np.float32, "double": np.float64}[declared.real]))
 
 
 class Units:
@@ -120,6 +113,7 @@ class Units:
             sensor.name: np.array([value.unit(f"{sensor.name}_{each.name}") for each in sensor.components])
             for sensor in spec.measurements
         }
+        self.readings: Array = np.concatenate([np.empty(0), *self.z.values()])  # all sensors' z, one after the other
         self.R: dict[str, Array] = {name: np.outer(z, z) / value.one for name, z in self.z.items()}
         self.parameters = {each.name: value.unit(each.name) for each in spec.parameters}
         run_time = spec.dt is not None and spec.dt.run_time

@@ -1,5 +1,7 @@
-"""The second-order extended Kalman filter (Athans, Wishner & Bertolini 1968; Bar-Shalom, Li & Kirubarajan 2001,
-section 10.3.2)."""
+"""The second-order extended Kalman filter.
+
+Athans, Wishner & Bertolini 1968; Bar-Shalom, Li & Kirubarajan 2001, section 10.3.2.
+"""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,14 +14,12 @@ from kfgen.reference.clock import Clock, step_of
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.linalg import lower_root, udu
 from kfgen.reference.log import Run, replay
+from kfgen.reference.mode import ModeView
 from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.parameters import Parameters
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.types import Filter, Spec
-
-if TYPE_CHECKING:
-    from kfgen.reference.imm import ModeView
 
 
 class ReferenceFilter:
@@ -79,6 +76,10 @@ class ReferenceFilter:
     @property
     def mu(self) -> Vector:
         """The probabilities (B) of the modes of an imm."""
+        raise self._missing("mu", "imm")
+
+    @mu.setter
+    def mu(self, mu: Vector) -> None:
         raise self._missing("mu", "imm")
 
     @property

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from kfgen.reference.algorithm import Estimate
 from kfgen.reference.bank import Bank, BankEstimate
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.filter import ReferenceFilter
-from kfgen.reference.linalg import lower_root
-from kfgen.spec.types import Filter, Spec
+from kfgen.reference.mode import ModeView
+from kfgen.spec.types import Spec
 
 
 class ReferenceImm(ReferenceFilter):
@@ -39,7 +41,10 @@ class ReferenceImm(ReferenceFilter):
 
     @property
     def modes(self) -> tuple[ModeView, ...]:
-        return tuple(ModeView(self, i) for i in range(len(self._names)))
+        return tuple(
+            ModeView(name, options, partial(self._mode_estimate, i))
+            for i, (name, options) in enumerate(zip(self._names, self._bank.options, strict=True))
+        )
 
     @property
     def R(self) -> dict[str, Matrix]:
@@ -49,58 +54,10 @@ class ReferenceImm(ReferenceFilter):
     def Q(self) -> Matrix:
         raise AttributeError(f"filter {self.spec.name} adapts no Q of its own; its modes have theirs: modes[i].Q")
 
+    def _mode_estimate(self, index: int) -> Estimate:
+        return self._state.modes[index]
+
     @property
     def _state(self) -> BankEstimate:
         assert isinstance(self._estimate, BankEstimate)
         return self._estimate
-
-
-class ModeView:
-    """One mode of a bank, as it is at present.
-
-    Attributes (arrays are copies): name; x (n), P (n, n), sqrt_covariance (n, n): the mode's own estimate;
-    R: sensor -> (m, m), Q (n, n): its adapted noise covariances. As in ReferenceFilter.
-    """
-
-    def __init__(self, kf: ReferenceImm, index: int) -> None:
-        self._filter, self._index = kf, index
-        self.name = kf._names[index]
-
-    @property
-    def _estimate(self) -> Estimate:
-        return self._filter._state.modes[self._index]
-
-    @property
-    def _options(self) -> Filter:
-        return self._filter._bank.options[self._index]
-
-    @property
-    def x(self) -> Vector:
-        return self._estimate.x.copy()
-
-    @property
-    def P(self) -> Matrix:
-        return self._estimate.P.copy()
-
-    @property
-    def sqrt_covariance(self) -> Matrix:
-        if self._options.covariance != "sqrt":
-            raise self._missing("sqrt_covariance", "covariance: sqrt")
-        return lower_root(self._estimate.P)
-
-    @property
-    def R(self) -> dict[str, Matrix]:
-        R = self._estimate.adapted.R
-        if not R:
-            raise self._missing("R", "adapt_R")
-        return {name: matrix.copy() for name, matrix in R.items()}
-
-    @property
-    def Q(self) -> Matrix:
-        Q = self._estimate.adapted.Q
-        if Q is None:
-            raise self._missing("Q", "adapt_Q")
-        return Q.copy()
-
-    def _missing(self, what: str, option: str) -> AttributeError:
-        return AttributeError(f"mode {self.name} has no {what}; its filter has no `{option}`")

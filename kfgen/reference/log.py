@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.reference.dual import Matrix, Vector
+from kfgen.reference.replayed import Replayed
 from kfgen.reference.status import Status
-
-if TYPE_CHECKING:
-    from kfgen.reference.filter import ReferenceFilter
 
 
 @dataclass(frozen=True)
@@ -33,7 +30,7 @@ class Run:
     mu: Matrix | None = None
 
 
-def replay(kf: ReferenceFilter, log: Mapping[str, Sequence[float]]) -> Run:
+def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
     """Per row: predict, then the updates in the spec's order.
 
     The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`) to values, NaN where there is no
@@ -85,7 +82,7 @@ def replay(kf: ReferenceFilter, log: Mapping[str, Sequence[float]]) -> Run:
     return result
 
 
-def _measure(kf: ReferenceFilter, name: str, z: Vector, u: Vector | None, result: Run, row: int) -> int:
+def _measure(kf: Replayed, name: str, z: Vector, u: Vector | None, result: Run, row: int) -> int:
     """One sensor of one row: its status, 0 where there is nothing to do."""
     sensor = kf.sensors[name]
     present = ~np.isnan(z)

@@ -27,6 +27,7 @@ from kfgen.reference.sensor import Reading
 from kfgen.reference.sigma_points import lower_root
 from kfgen.reference.spread import Spread, downdated, pivots, settled, spread
 from kfgen.reference.status import Status, StepError
+from kfgen.spec import DOUBLE
 from kfgen.spec.types import Adaptive
 
 
@@ -52,7 +53,7 @@ class Ukf(Algorithm):
         self._rejects = reject is not None
         self._reject = None if reject is None or isinstance(reject, str) else model.scope.compile(reject)
         # pivots of the predicted reading's covariance that count for the inflation, relative to those of S
-        self._known = 1e-12 if model.spec.scalar == "double" else 1e-6
+        self._known = 1e-12 if model.spec.scalar == DOUBLE else 1e-6
 
     # --- predict
 

@@ -5,6 +5,6 @@ from __future__ import annotations
 from kfgen.scalars.base import Scalar
 from kfgen.scalars.floating import DOUBLE, FLOAT
 
-SCALARS: dict[str, Scalar] = {"float": FLOAT, "double": DOUBLE}
+SCALARS: dict[str, Scalar] = {each.name: each for each in (FLOAT, DOUBLE)}
 
 __all__ = ["SCALARS", "Scalar"]

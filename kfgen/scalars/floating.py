@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from kfgen import scalar_names
+
 _LIBM = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "floor",
          "atan2", "pow")  # fmt: skip
 
@@ -144,5 +146,5 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "select": lambda s, d, c, a, b: a if c else b,
 }
 
-FLOAT = Floating("float", np.float32, "f")
-DOUBLE = Floating("double", np.float64, "")
+FLOAT = Floating(scalar_names.FLOAT, np.float32, "f")
+DOUBLE = Floating(scalar_names.DOUBLE, np.float64, "")

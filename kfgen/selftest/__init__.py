@@ -13,7 +13,7 @@ from kfgen.emit.render import render_c
 from kfgen.emit.text import WIDTH
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.generate import Generated
-from kfgen.native.header import Header, parse
+from kfgen.scalar_names import DOUBLE
 from kfgen.scalars import SCALARS, Scalar
 from kfgen.selftest.exact import record_exactly
 from kfgen.selftest.record import Record, record
@@ -84,28 +84,28 @@ def selftest(spec: Spec, generated: Generated, track: Track | None = None) -> di
     track: what is replayed, in place of a short simulated run. In fixed point every number must come out to the bit.
     """
     track = track_of(spec) if track is None else track
-    header = parse(generated.files[f"{spec.name}.h"], spec.name)
     scalar: Scalar
     if spec.scalar in SCALARS:
         scalar, found = SCALARS[spec.scalar], record(spec, track)
     else:
         scalar = fixed = Fixed(spec.scalar, spec.fixed.rounding)
-        found = record_exactly(spec, generated.code, fixed, header, track)
-    made = _view(spec, generated, scalar, header, found)
+        found = record_exactly(spec, generated.code, fixed, generated.declarations, track)
+    made = _view(spec, generated, scalar, found)
     return {f"{spec.name}_selftest.c": render_c("selftest/selftest.c.j2", s=made, v=made.view)}
 
 
-def _view(spec: Spec, generated: Generated, scalar: Scalar, header: Header, found: Record) -> SelfTest:
+def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> SelfTest:
+    declared = generated.declarations
     exact = found.statuses is not None
     track = found.track
     sensors: list[Update] = []
     first = 0
     for sensor in spec.measurements:
-        takes_u = header.takes(f"update_{sensor.name}", "u")
+        takes_u = declared.takes(f"update_{sensor.name}", "u")
         names = tuple(component.name for component in sensor.components)
         sensors.append(Update(sensor.name, names, first, 1 + len(sensors), ", &u" if takes_u else ""))
         first += len(names)
-    takes = [name for name in ("u", "dt") if header.takes("predict", name)]
+    takes = [name for name in ("u", "dt") if declared.takes("predict", name)]
     uses_u = "u" in takes or any(each.arguments for each in sensors)
     arrays = [_array("readings", "all sensors' components, step by step", track.z.ravel(), scalar)]
     if uses_u:
@@ -140,7 +140,7 @@ def _nearness(spec: Spec, scalar: Scalar, tolerance: float) -> Nearness:
     return Nearness(
         f"{tolerance:g}", scalar.literal(Fraction(str(tolerance))), scalar.literal(ULPS * scalar.epsilon),
         scalar.literal(Fraction(1, 10000)), scalar.literal(Fraction(2)),
-        ("1e-2", "2e-6") if spec.scalar == "double" else None,
+        ("1e-2", "2e-6") if spec.scalar == DOUBLE else None,
     )  # fmt: skip
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from kfgen.emit.declarations import Declarations
 from kfgen.errors import KfgenError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.ir import interpret
-from kfgen.native.header import Header
 from kfgen.native.values import Units, value_of
 from kfgen.selftest.record import Record
 from kfgen.selftest.track import Track
@@ -55,15 +55,15 @@ class Twin:
         return [P[i * n + i] for i in range(n)]
 
 
-def record_exactly(spec: Spec, code: FilterCode, scalar: Fixed, header: Header, track: Track) -> Record:
+def record_exactly(spec: Spec, code: FilterCode, scalar: Fixed, declared: Declarations, track: Track) -> Record:
     """The record of a program, its track in raw numbers. KfgenError where not one step can be recorded."""
-    value = value_of(header)
+    value = value_of(declared)
     units = Units(spec, value)
     u, dt = value.to_raw(track.u, units.u), value.to_raw(track.dt, units.dt)
     z = value.to_raw(track.z, np.concatenate([units.z[sensor.name] for sensor in spec.measurements]))
     twin = Twin(code, scalar)
     status = twin.call("init")
-    covariance = header.has("get_covariance")
+    covariance = declared.has("get_covariance")
     xs, variances, statuses = [], [], []
     for k in range(len(dt)):
         if status < ERROR:

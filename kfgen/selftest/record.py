@@ -16,16 +16,17 @@ from kfgen.errors import KfgenError
 from kfgen.geometry import part_of
 from kfgen.reference import ReferenceFilter, reference
 from kfgen.reference.status import Status
+from kfgen.scalar_names import DOUBLE, FLOAT
 from kfgen.selftest.track import Track
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
 
-TOLERANCES = {"float": 1e-2, "double": 1e-6}
+TOLERANCES = {FLOAT: 1e-2, DOUBLE: 1e-6}
 """Largest error of x in sigma, and of a variance relative to itself."""
 
 
-FINEST = {"float": 2.0**-22, "double": 2.0**-44}
+FINEST = {FLOAT: 2.0**-22, DOUBLE: 2.0**-44}
 """What recorded states are multiples of, at least, relative to their size."""
 
 
@@ -77,8 +78,8 @@ def record(spec: Spec, track: Track) -> Record:
 def _near(ref: ReferenceFilter, coarse: ReferenceFilter, variance: Array) -> bool:
     parts = [part_of(ref.model.periods.get(i)) for i in range(len(ref.x))]
     error = np.abs([part.local(a, b) for part, a, b in zip(parts, ref.x, coarse.x, strict=True)])
-    allowed = TOLERANCES["float"] / 8 * np.sqrt(np.maximum(variance, 0.0)) + 1e-6 * np.abs(ref.x)
-    apart = np.abs(np.diag(coarse.P) - variance) > TOLERANCES["float"] / 8 * variance + 1e-6 * np.max(variance)
+    allowed = TOLERANCES[FLOAT] / 8 * np.sqrt(np.maximum(variance, 0.0)) + 1e-6 * np.abs(ref.x)
+    apart = np.abs(np.diag(coarse.P) - variance) > TOLERANCES[FLOAT] / 8 * variance + 1e-6 * np.max(variance)
     return not (np.any(error > allowed) or np.any(apart))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from kfgen.scalar_names import DOUBLE, FLOAT
 from kfgen.spec.loading import load, loads, warnings, with_scalar
 from kfgen.spec.tree import Call, Expression, Name, Number, Tree
 from kfgen.spec.types import (
@@ -32,8 +33,8 @@ from kfgen.spec.types import (
 )
 
 __all__ = [
-    "Adaptive", "Call", "Code", "Component", "Constant", "Covariance", "Definition", "Dynamics", "Expression",
-    "Filter", "Fixed", "Gate", "Imm", "Initialize", "Input", "Matrix", "Mode", "Name", "Noise", "Number",
+    "DOUBLE", "FLOAT", "Adaptive", "Call", "Code", "Component", "Constant", "Covariance", "Definition", "Dynamics",
+    "Expression", "Filter", "Fixed", "Gate", "Imm", "Initialize", "Input", "Matrix", "Mode", "Name", "Noise", "Number",
     "Parameter", "Range", "Robust", "Sensor", "SigmaPoints", "Spec", "State", "Step", "Tree", "load", "loads",
     "warnings", "with_scalar",
 ]  # fmt: skip

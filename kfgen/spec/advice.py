@@ -5,7 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.errors import Mistake
-from kfgen.spec.constants import NotConstant, NoValue, environment_of, less, value
+from kfgen.scalar_names import DOUBLE
+from kfgen.spec.constants import NotConstant, environment_of, value
+from kfgen.spec.operations import NoValue, less
 from kfgen.spec.types import Spec
 
 
@@ -15,7 +17,7 @@ def warnings(spec: Spec) -> list[Mistake]:
     known = environment_of(spec)
     for chosen in [m.filter for m in spec.imm.modes] if spec.imm else [spec.filter]:
         points = chosen.sigma_points
-        if points is None or points.alpha is None or spec.scalar == "double":
+        if points is None or points.alpha is None or spec.scalar == DOUBLE:
             continue
         try:
             alpha = value(points.alpha.tree, known)

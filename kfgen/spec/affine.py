@@ -13,7 +13,8 @@ from fractions import Fraction
 
 import mpmath
 
-from kfgen.spec.constants import DIGITS, NotConstant, NoValue, Value, keep, real, value
+from kfgen.spec.constants import NotConstant, keep, value
+from kfgen.spec.operations import DIGITS, NoValue, Value, real
 from kfgen.spec.scopes import Context
 from kfgen.spec.tree import Call, Name, Tree
 

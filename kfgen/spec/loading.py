@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from kfgen.errors import Mistake, Place, SpecError
+from kfgen.scalar_names import KNOWN, is_scalar
 from kfgen.spec.advice import warnings as _warnings
-from kfgen.spec.build import Builder
-from kfgen.spec.names import SCALARS, check_identifiers, is_scalar
+from kfgen.spec.builders import Builder
+from kfgen.spec.names import check_identifiers
 from kfgen.spec.nodes import Mapping, kind_of
 from kfgen.spec.problems import Problems, short
 from kfgen.spec.reader import MAX_BYTES, read
@@ -75,7 +76,7 @@ def with_scalar(spec: Spec, scalar: str) -> Spec:
     """The same spec with another scalar; a SpecError where there is none, or emitted names collide."""
     problems = Problems(spec.file)
     if not is_scalar(scalar):
-        raise problems.stop(Place(spec.file, 1, 1, "scalar"), f"there is no scalar {short(scalar)}", SCALARS)
+        raise problems.stop(Place(spec.file, 1, 1, "scalar"), f"there is no scalar {short(scalar)}", KNOWN)
     spec = replace(spec, scalar=scalar)
     check_identifiers(spec, problems)
     if problems.mistakes:

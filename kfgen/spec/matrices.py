@@ -7,7 +7,7 @@ from typing import Any
 
 import mpmath
 
-from kfgen.spec.constants import Value, real
+from kfgen.spec.operations import Value, real
 
 Rows = Sequence[Sequence[Value]]
 _DIGITS = 40

@@ -6,28 +6,18 @@ import re
 from collections.abc import Iterator
 
 from kfgen.errors import Place
+from kfgen.scalar_names import is_fixed
 from kfgen.spec.problems import Problems, short
 from kfgen.spec.reserved import C_HEADERS, reserved
 from kfgen.spec.types import Spec
 
 MAX_NAME = 40
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
-_Q = re.compile(r"q([1-9]\d?)\.([1-9]\d?)\Z", re.ASCII)
-
-SCALARS = "write float, double or q<m>.<n> with m + n = 32 and 8 <= n <= 24, such as q16.16"
 
 STATUS = (
     "OK", "REGULARIZED", "GLITCH_SMALL", "GLITCH_LARGE", "ANOMALY", "GATED", "SATURATED", "DT_CLAMPED",
     "POINT_REJECTED", "ERROR", "NULL_ARGUMENT", "NOT_FINITE", "NOT_POSITIVE",
 )  # fmt: skip
-
-
-def is_scalar(text: str) -> bool:
-    """float, double or q<m>.<n> with m + n = 32 and 8 <= n <= 24."""
-    if text in ("float", "double"):
-        return True
-    match = _Q.match(text)
-    return match is not None and 8 <= int(match[2]) <= 24 and int(match[1]) + int(match[2]) == 32
 
 
 def wrong_name(name: str) -> tuple[str, str] | None:
@@ -95,7 +85,7 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
     for mode in spec.imm.modes if spec.imm else ():
         yield f"{upper}_MODE_{mode.name.upper()}", f"the index of the mode `{mode.name}`", mode.place
         yield f"{lower}_mode_{mode.name}_t", f"the type of the mode `{mode.name}`", mode.place
-    if spec.scalar.startswith("q"):
+    if is_fixed(spec.scalar):
         yield from _scaled(spec, upper)
 
 

@@ -15,14 +15,13 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 
 from kfgen.errors import SpecError
+from kfgen.spec.commas import join_items, joined_pairs
 from kfgen.spec.nodes import Bad, Mapping, Node, Scalar, Sequence, columns_of, refused
 from kfgen.spec.problems import Problems, short
 
 MAX_BYTES = 1_000_000
 MAX_NODES = 50_000  # after expansion of aliases
 MAX_DEPTH = 40
-_QUOTE = "quote the expression"
-_WINDOW = 50  # entries of a list that one split expression may have become
 
 
 @dataclass(slots=True)
@@ -184,7 +183,7 @@ class _Composer:
         if isinstance(frame.node, Mapping):
             self._finish_mapping(frame, frame.node)
         elif frame.node.flow:
-            self._finish_list(frame, frame.node)
+            join_items(frame.node.items, frame.path, self.problems)
         self._put(frame.node, frame.anchor, opened=True)
 
     def _put(self, node: Node, anchor: str | None, opened: bool = False) -> None:
@@ -226,11 +225,9 @@ class _Composer:
         self.problems.add(self.problems.at(node.line, node.column, path), *wrong)
         return Bad(node.line, node.column)
 
-    # --- mappings and lists, once complete
-
     def _finish_mapping(self, frame: _Frame, node: Mapping) -> None:
         seen: dict[str, Scalar] = {}
-        pairs = self._join_split_expressions(frame) if node.flow else frame.pairs
+        pairs = joined_pairs(frame.pairs, frame.path, self.problems) if node.flow else frame.pairs
         for key, value in pairs:
             if isinstance(key, Bad):
                 continue
@@ -254,72 +251,3 @@ class _Composer:
             if isinstance(value, Scalar):
                 value = self._checked(value, path)
             node.items.append((key, value))
-
-    def _join_split_expressions(self, frame: _Frame) -> list[tuple[Scalar | Bad, Node]]:
-        """`{th: atan2(py, px)}` is two keys to YAML: say so once, where the expression begins."""
-        joined: list[tuple[Scalar | Bad, Node]] = []
-        pairs = frame.pairs
-        i = 0
-        while i < len(pairs):
-            key, value = pairs[i]
-            i += 1
-            prefix = f"{frame.path}." if frame.path else ""
-            name = key.text if isinstance(key, Scalar) else ""
-            depth = _open_parentheses(value)
-            pieces = [value.text] if isinstance(value, Scalar) else []
-            end = i
-            while depth > 0 and end < len(pairs) and _is_piece(*pairs[end]):
-                piece = pairs[end][0]
-                assert isinstance(piece, Scalar)
-                pieces.append(piece.text)
-                depth += _open_parentheses(piece)
-                end += 1
-            if end > i:
-                at = self.problems.at(value.line, value.column, prefix + name)
-                whole = ", ".join(pieces)
-                self.problems.add(
-                    at,
-                    f"the comma in {short(whole, 60)} splits the expression into two keys",
-                    f'{_QUOTE}: `{name}: "{whole}"`',
-                )
-                value, i = Bad(value.line, value.column), end
-            elif isinstance(key, Scalar) and _is_piece(key, value):
-                at = self.problems.at(key.line, key.column, prefix + name)
-                empty = isinstance(value, Scalar) and value.kind == "null"
-                what = "has no value" if empty else "holds a parenthesis or a bracket"
-                hint = f"{_QUOTE} if a comma of it stands here, or write a value"
-                self.problems.add(at, f"the key {short(name)} {what}", hint)
-                if not empty or not name.isidentifier():
-                    continue
-                value = Bad(value.line, value.column)
-            joined.append((key, value))
-        return joined
-
-    def _finish_list(self, frame: _Frame, node: Sequence) -> None:
-        items = node.items
-        for i, item in enumerate(items):
-            depth = _open_parentheses(item)
-            end = i + 1
-            while depth > 0 and end < min(len(items), i + _WINDOW) and isinstance(items[end], Scalar):
-                depth += _open_parentheses(items[end])
-                end += 1
-            if end > i + 1 and depth == 0:
-                whole = ", ".join(n.text for n in items[i:end] if isinstance(n, Scalar))
-                at = self.problems.at(item.line, item.column, f"{frame.path}[{i}]")
-                text = f"the comma in {short(whole, 60)} splits the expression into two entries"
-                self.problems.add(at, text, f'{_QUOTE}: "{whole}"')
-                items[i:end] = [Bad(item.line, item.column)]
-                return
-
-
-def _open_parentheses(node: Node) -> int:
-    if not isinstance(node, Scalar) or not node.plain:
-        return 0
-    return node.text.count("(") - node.text.count(")")
-
-
-def _is_piece(key: Scalar | Bad, value: Node) -> bool:
-    """Whether a pair of a flow mapping looks like the rest of an expression that a comma split."""
-    if not isinstance(key, Scalar) or not key.plain:
-        return isinstance(key, Scalar) and isinstance(value, Scalar) and value.kind == "null"
-    return "(" in key.text or ")" in key.text or (isinstance(value, Scalar) and value.kind == "null")

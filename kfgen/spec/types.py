@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from kfgen.errors import NOWHERE, Place
+from kfgen.scalar_names import FLOAT
 from kfgen.spec.tree import Expression
 
 Matrix = tuple[tuple[Expression, ...], ...]
@@ -242,7 +243,7 @@ class Spec:
     file: str  # as given by the caller; used in messages only, never in output
     sha256: str  # of the bytes of the file
     description: str = ""
-    scalar: str = "float"  # float | double | q<m>.<n>
+    scalar: str = FLOAT  # float | double | q<m>.<n>
     constants: tuple[Constant, ...] = ()  # in an order in which each uses only those before it
     parameters: tuple[Parameter, ...] = ()
     dt: Step | None = None

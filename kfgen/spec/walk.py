@@ -10,9 +10,10 @@ from typing import Any
 
 from kfgen.errors import Place
 from kfgen.spec.expressions import parse
+from kfgen.spec.hints import meant_key, missing_key_hint, unknown_key_hint, wanted_words
 from kfgen.spec.lexer import ExpressionError
 from kfgen.spec.nodes import Bad, Mapping, Node, Scalar, Sequence, kind_of
-from kfgen.spec.problems import Problems, did_you_mean, short, suggestion
+from kfgen.spec.problems import Problems, did_you_mean, short
 from kfgen.spec.raw import BAD, Fields, Path, Word, Written, path_text
 from kfgen.spec.shapes import (
     Budget,
@@ -21,7 +22,6 @@ from kfgen.spec.shapes import (
     Flag,
     Formula,
     Items,
-    Key,
     Record,
     Reference,
     Shape,
@@ -261,7 +261,7 @@ class Walker:
             place = self.problems.at(name.line, name.column, path_text(inner))
             if key is None:
                 self.problems.add(place, f"unknown key {short(name.text)}", unknown_key_hint(name.text, known))
-                meant = _SYNONYMS.get(name.text) or suggestion(name.text, known) or ""
+                meant = meant_key(name.text, known)
                 self.meant.add(path_text((*path, meant)))
                 if isinstance(value, Mapping):
                     self.doubtful.update(inner_key.text for inner_key, _ in value.items)
@@ -294,45 +294,3 @@ class Walker:
                 text += f": {only.reason(chosen)}"
             hint = f"remove it, or choose `{only.key}: {' | '.join(only.values)}`"
             self.problems.add(fields.places[key.name], text, hint)
-
-
-# what other tools call a key
-_SYNONYMS = {
-    "sigma": "std", "variance": "var", "initial": "init", "x0": "init", "process": "dynamics",
-    "model": "dynamics", "params": "parameters", "sensors": "measurements", "method": "integrator",
-}  # fmt: skip
-
-
-def unknown_key_hint(word: str, known: list[str]) -> str:
-    synonym = _SYNONYMS.get(word)
-    return f"did you mean `{synonym}`?" if synonym in known else did_you_mean(word, known, "keys here")
-
-
-def missing_key_hint(key: Key) -> str:
-    example = "1" if key.name == "kfgen" else "..."
-    return f"write `{key.name}: {example}` ({key.doc[0].lower() + key.doc[1:].rstrip('.')})"
-
-
-def wanted_words(shape: Shape) -> str:
-    """What a shape is, in words."""
-    if isinstance(shape, Text):
-        return "text"
-    if isinstance(shape, Flag):
-        return "true or false"
-    if isinstance(shape, Choice):
-        return "one of " + ", ".join(shape.values)
-    if isinstance(shape, Formula | Whole):
-        return "a number or an expression"
-    if isinstance(shape, Budget):
-        return "a number of bytes"
-    if isinstance(shape, Reference):
-        return f"the name of a {shape.of}"
-    if isinstance(shape, Items):
-        return f"a list of {shape.what}"
-    if isinstance(shape, Tuple):
-        return shape.what
-    if isinstance(shape, Record):
-        return "a mapping"
-    if isinstance(shape, Table):
-        return f"a mapping ({shape.of}: value)"
-    return " or ".join(wanted_words(s) for s in (shape.scalar, shape.mapping, shape.sequence) if s)

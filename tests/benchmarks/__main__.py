@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from concurrent.futures import ProcessPoolExecutor
 
-from kfgen.commands.options import aligned
+from kfgen.commands.tables import aligned
 from kfgen.cost import Cost
 from tests.benchmarks.budgets import CEILINGS, GENERATION, INERTIAL, PROBLEMS, cost, inertial_cost
 from tests.benchmarks.generation import cold_build

@@ -94,8 +94,8 @@ CEILINGS: Mapping[tuple[str, str], Ceiling] = {
 def inertial_cost() -> Cost:
     """Measure the 24-state inertial filter."""
     spec = load(INERTIAL)
-    files = build(spec).files
-    return measure(spec, files, simulate(spec, 10), flags=recommended_flags(files[f"{spec.name}.h"]))
+    generated = build(spec)
+    return measure(generated, simulate(spec, 10), flags=recommended_flags(generated.view))
 
 
 def cost(name: str, form: str) -> Cost:
@@ -103,6 +103,6 @@ def cost(name: str, form: str) -> Cost:
     problem = PROBLEMS[name]
     covariance, update = FORMS[form]
     spec = override(loads(problem.spec), "float", filter={"covariance": covariance, "update": update})
-    files = build(spec).files
-    flags = recommended_flags(files[f"{spec.name}.h"]) if problem.n >= FLAGS_FROM else []
-    return measure(spec, files, simulate(spec, ROWS), flags=flags)
+    generated = build(spec)
+    flags = recommended_flags(generated.view) if problem.n >= FLAGS_FROM else []
+    return measure(generated, simulate(spec, ROWS), flags=flags)

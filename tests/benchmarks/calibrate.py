@@ -82,7 +82,7 @@ def rows(job: Job) -> list[Row]:
         generated = build(spec, judge=False)
     except SpecError:
         return []  # a form that this filter cannot have
-    flags = recommended_flags(generated.files[f"{spec.name}.h"])
+    flags = recommended_flags(generated.view)
     flash, stack = compiled(spec.name, generated.files, flags)
     out: list[Row] = []
     for function in generated.code.functions:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from shutil import which
 
-from kfgen.commands.options import aligned
+from kfgen.commands.tables import aligned
 from kfgen.cost import Cost, measure
 from kfgen.generate import build
 from kfgen.override import override
@@ -38,11 +39,12 @@ def cost(problem: str, covariance: str, target: str, scalar: str = "q16.16", pla
     """One predict and one update of a problem. plain: with nothing but what C offers."""
     filter_ = {"covariance": covariance, "update": FORMS[covariance]}
     spec = override(loads(SPECS[problem]), scalar, filter=filter_)
-    files: Mapping[str, str] = build(spec).files
+    generated = build(spec)
     log = simulate(spec, ROWS)
     if not plain:
-        return measure(spec, files, log, target=target)
-    return measure(spec, _plain(spec.name, files), log, target=target, flags=("-w",))
+        return measure(generated, log, target=target)
+    generated = replace(generated, files=_plain(spec.name, generated.files))
+    return measure(generated, log, target=target, flags=("-w",))
 
 
 def _plain(name: str, files: Mapping[str, str]) -> dict[str, str]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from kfgen.cost import recommended_flags
+from kfgen.generate import build
+from kfgen.spec import loads
 from tests.benchmarks.budgets import (
     CEILINGS,
     GENERATION,
@@ -46,7 +49,9 @@ def test_inertial_filter():
     assert cold_build(INERTIAL.read_text(), 1)[1] <= 2 * INERTIAL_GENERATION
 
 
-def test_flags_are_read_from_the_header():
-    header = "/* x\n * RAM 4 bytes. Functions in -O2:\n * gcc with the flags\n *   -O2 -fno-schedule-insns\n *\n */"
-    assert recommended_flags(header) == ["-O2", "-fno-schedule-insns"]
-    assert recommended_flags("/* none */") == []
+def test_the_flags_are_those_that_the_header_names():
+    for name, long in (("cv4", False), ("chain12", True)):
+        generated = build(loads(PROBLEMS[name].spec))
+        named = re.findall(r"^ \*\s+(-O\S.*)$", generated.files[f"{generated.spec.name}.h"], re.MULTILINE)
+        assert [" ".join(recommended_flags(generated.view))] == (named or [""])
+        assert bool(named) == long

@@ -18,7 +18,7 @@ MOST = Ceiling(instructions=1300, flash=4500, ram=200, stack=200)
 
 def cost(text: str) -> Cost:
     spec = override(loads(text), "float")
-    return measure(spec, build(spec).files, simulate(spec, 40))
+    return measure(build(spec), simulate(spec, 40))
 
 
 @pytest.mark.usefixtures("_tools")

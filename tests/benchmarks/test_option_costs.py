@@ -22,7 +22,7 @@ def cost(options: str) -> Cost:
     spec = override(loads(problems.CV4.replace("{type: ekf}", f"{{type: ekf{options}}}")), "float")
     log = simulate(spec, 60, 1)
     log.columns["gnss.x"][::20] += 200
-    return measure(spec, build(spec).files, log)
+    return measure(build(spec), log)
 
 
 @pytest.mark.usefixtures("_tools")

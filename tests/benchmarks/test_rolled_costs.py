@@ -36,8 +36,8 @@ def spec_of(n: int, covariance: str, update: str | None, unroll: str, options: s
 @cache
 def cost(n: int, covariance: str, update: str | None, unroll: str = "none", options: str = "") -> Cost:
     spec = spec_of(n, covariance, update, unroll, options)
-    files = build(spec).files
-    return measure(spec, files, simulate(spec, 8), flags=recommended_flags(files[f"{spec.name}.h"]))
+    generated = build(spec)
+    return measure(generated, simulate(spec, 8), flags=recommended_flags(generated.view))
 
 
 @pytest.mark.usefixtures("_tools")
@@ -67,9 +67,9 @@ def test_a_budget_that_loops_keep_is_kept(form):
         spec = spec_of(8, *form, "auto")
         spec = replace(spec, code=replace(spec.code, flash=budget))
         try:
-            files = build(spec).files
+            generated = build(spec)
         except SpecError:
             assert budget < 2 * least  # functions that are not measured here count too
             continue
-        found = measure(spec, files, simulate(spec, 3), flags=recommended_flags(files[f"{spec.name}.h"]))
+        found = measure(generated, simulate(spec, 3), flags=recommended_flags(generated.view))
         assert found.flash <= budget

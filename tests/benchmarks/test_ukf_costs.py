@@ -39,9 +39,9 @@ SQRT = 1.6  # times the instructions of the full form
 @cache
 def cost(name: str, form: str) -> Cost:
     spec = override(loads(PROBLEMS[name].replace("type: ekf", f"type: ukf, {form}")), "float")
-    files = build(spec).files
-    flags = recommended_flags(files[f"{spec.name}.h"]) if len(spec.states) >= 8 else []
-    return measure(spec, files, simulate(spec, 30), flags=flags)
+    generated = build(spec)
+    flags = recommended_flags(generated.view) if len(spec.states) >= 8 else []
+    return measure(generated, simulate(spec, 30), flags=flags)
 
 
 @pytest.mark.usefixtures("_tools")
@@ -62,7 +62,7 @@ def test_sqrt(name):
 @pytest.mark.usefixtures("_tools")
 def test_a_linear_measurement_costs_what_it_costs_an_ekf():
     spec = override(loads(problems.VEHICLE4), "float", filter={"covariance": "full", "update": "standard"})
-    plain = measure(spec, build(spec).files, simulate(spec, 30))
+    plain = measure(build(spec), simulate(spec, 30))
     for function, counts in plain.instructions.items():
         if function.startswith("update_"):
             assert cost("vehicle4", "covariance: full").instructions[function] == counts

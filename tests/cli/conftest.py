@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -12,7 +12,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from kfgen.cli import cli
+from kfgen.emit.declarations import Declarations
+from kfgen.logs import Log
 from kfgen.spec.types import Spec
+from tests.native.small import vehicle_small
 
 NATIVE = Path(__file__).parent.parent / "native"
 
@@ -40,26 +43,22 @@ class Summary:
 
 @dataclass
 class Generated:
-    files: dict[str, str]
+    files: Mapping[str, str]
+    spec: Spec
+    declarations: Declarations
     summary: Summary = field(default_factory=Summary)
     fixed: None = None
 
 
-def generate(spec: Spec) -> dict[str, str]:
-    texts = {ending: (NATIVE / f"vehicle_small.{ending}").read_text() for ending in ("h", "c")}
-    return {
-        f"{spec.name}.{ending}": text.replace("vehicle_small", spec.name)
-        .replace("VEHICLE_SMALL", spec.name.upper())
-        .replace("float ", f"{spec.scalar} ")
-        for ending, text in texts.items()
-    }
+def build(spec: Spec, log: Log | None = None) -> Generated:
+    made = vehicle_small(spec)
+    return Generated(made.files, spec, made.declarations)
 
 
 @pytest.fixture(autouse=True)
 def _generator(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
     module = ModuleType("kfgen.generate")
-    module.generate = generate  # type: ignore[attr-defined]
-    module.build = lambda spec, log=None: Generated(module.generate(spec))  # type: ignore[attr-defined]
+    module.build = build  # type: ignore[attr-defined]
     module.Generated = Generated  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "kfgen.generate", module)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp().parent / "kfgen-test-cache"))

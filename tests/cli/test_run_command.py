@@ -4,6 +4,7 @@ import csv
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -142,10 +143,13 @@ def test_check_passes(kfgen):
 
 def test_check_fails(kfgen, monkeypatch):
     module = sys.modules["kfgen.generate"]
-    right = module.generate
-    monkeypatch.setattr(
-        module, "generate", lambda spec: {n: text.replace("0.64f", "0.7f") for n, text in right(spec).items()}
-    )
+    right = module.build
+
+    def wrong(spec):
+        made = right(spec)
+        return replace(made, files={name: text.replace("0.64f", "0.7f") for name, text in made.files.items()})
+
+    monkeypatch.setattr(module, "build", wrong)
     result = kfgen("check", SPEC)
     assert result.exit_code == 1
     assert "FAILED" in result.stdout

@@ -27,9 +27,9 @@ def here():
     found = {}
     for text in (problems.CV4, problems.chain(8)):
         spec = override(loads(text), "float")
-        files = build(spec).files
-        job = make_job(spec, files, simulate(spec, STEPS), STEPS)
-        (kf,) = load_filters([(spec, files)], flags=("-O2", *FLAGS))
+        generated = build(spec)
+        job = make_job(generated, simulate(spec, STEPS), STEPS)
+        (kf,) = load_filters([generated], flags=("-O2", *FLAGS))
         states = [memory(kf)]
         for step in job.steps:
             if step.function == "predict":
@@ -46,7 +46,7 @@ def zs(step) -> str:
 
 
 def memory(kf) -> bytes:
-    return bytes(kf._ffi.buffer(kf._kf))
+    return bytes(kf.struct.ffi.buffer(kf.struct.data))
 
 
 def replayed(job, flags: tuple[str, ...], target: str, size: int) -> list[bytes]:

@@ -28,8 +28,8 @@ WITHIN = 0.25
 
 def measured(spec):
     generated = build(spec, judge=False)
-    flags = recommended_flags(generated.files[f"{spec.name}.h"])
-    return generated.summary.prediction, measure(spec, generated.files, simulate(spec, 6), flags=flags)
+    flags = recommended_flags(generated.view)
+    return generated.summary.prediction, measure(generated, simulate(spec, 6), flags=flags)
 
 
 def test_every_spec_is_predicted(needs):
@@ -48,7 +48,7 @@ def test_every_spec_is_predicted(needs):
 def compiled_flash(spec):
     """Bytes of what a prediction is of, as compiled and not linked."""
     generated = build(spec, judge=False)
-    flags = recommended_flags(generated.files[f"{spec.name}.h"])
+    flags = recommended_flags(generated.view)
     flash, _ = compiled(spec.name, generated.files, flags)
     rest = rf"{spec.name}_(set_|get_|redraw|update_\w+_masked)"
     found = sum(size for name, size in flash.items() if not re.match(rest, name))

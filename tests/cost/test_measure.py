@@ -32,8 +32,9 @@ filter: {type: ekf}
 def test_agrees_with_an_independent_measurement(needs, text):
     needs("arm-none-eabi-gcc")
     spec = override(loads(text), "float")
-    files, log = build(spec).files, simulate(spec, 15)
-    found, other = measure(spec, files, log, compiler="gcc"), independent.measure(spec, files, log)
+    generated, log = build(spec), simulate(spec, 15)
+    found = measure(generated, log, compiler="gcc")
+    other = independent.measure(spec, generated.files, log)
     assert {name: list(each) for name, each in found.instructions.items() if each} == other.instructions
     assert (found.flash, found.ram, found.stack, found.errors) == (other.flash, other.ram, other.stack, 0)
     assert found.flash_linked > found.flash  # sinf
@@ -46,7 +47,7 @@ def test_a_masked_update_is_measured_where_the_log_has_gaps(needs):
     log = simulate(spec, 12)
     log.columns["both.a"][::3] = float("nan")
     log.columns["both.b"][5] = log.columns["both.a"][5] = float("nan")
-    found = measure(spec, build(spec).files, log)
+    found = measure(build(spec), log)
     assert len(found.functions["predict"].counts) == 12
     assert len(found.functions["update_both"].counts) == 7
     assert len(found.functions["update_both_masked"].counts) == 4
@@ -56,7 +57,7 @@ def test_a_masked_update_is_measured_where_the_log_has_gaps(needs):
 @pytest.fixture(scope="module")
 def cv4():
     spec = override(loads(problems.CV4), "float")
-    return spec, build(spec).files, simulate(spec, 3)
+    return build(spec), simulate(spec, 3)
 
 
 # one predict and one update of cv4, roughly: in hardware, in software
@@ -126,9 +127,9 @@ def test_double_and_its_arguments(needs):
     """A step given as a double, beside a pointer: the compiler's own affair, on each ABI."""
     needs("arm-none-eabi-gcc", "riscv64-unknown-elf-gcc")
     spec = loads(PARTIAL.replace("name: partial", "name: partial\nscalar: double"))
-    files, log = build(spec).files, simulate(spec, 3)
+    generated, log = build(spec), simulate(spec, 3)
     for name in ("cortex-m4f", "cortex-m7", "rv32imafc"):
-        found = measure(spec, files, log, name)
+        found = measure(generated, log, name)
         assert found.errors == 0
         assert len(found.functions["predict"].counts) == 3
 
@@ -159,14 +160,13 @@ def test_maps():
 def test_the_avr_program_holds_every_call(cv4):
     from kfgen.cost import make_job
 
-    spec, files, log = cv4
-    text = avr._main(make_job(spec, files, log))
+    text = avr._main(make_job(*cv4))
     assert "order[] PROGMEM = { 1, 2, 1, 2, 1, 2 };" in text
 
 
 def test_what_ziglang_lacks_is_told():
     pytest.importorskip("ziglang")
     spec = loads(PARTIAL)
-    found = measure(spec, build(spec).files, simulate(spec, 2), compiler="zig")
+    found = measure(build(spec), simulate(spec, 2), compiler="zig")
     assert found.remark.startswith("sinf, cosf")
     assert found.functions["predict"].mean > 300  # a double sine without doubles

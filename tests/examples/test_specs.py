@@ -25,7 +25,7 @@ def test_is_named_like_its_file(path):
 def test_agrees_with_the_reference(path):
     spec = kfgen.load(path)
     outcome = compare(kfgen.compile(spec), kfgen.reference(spec), STEPS)
-    assert outcome.passed, outcome.text()
+    assert outcome.passed, outcome
 
 
 STEPS = 80

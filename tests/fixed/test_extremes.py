@@ -72,7 +72,7 @@ LOG = simulate(override(loads(text("ud")), "double"), AT + AFTER, seed=31).colum
 
 def step(kf, ref, k, a=None, z=None):
     """One row in both, of numbers that the integers can hold; the flags of the integers."""
-    value, units = kf._value, kf._units
+    value, units = kf.struct.value, kf.struct.units
     u = value.to_physical(value.to_raw(np.array([LOG["a"][k]]), units.u), units.u) if a is None else [a]
     z = value.to_physical(value.to_raw(np.array([LOG["pos.d"][k]]), units.z["pos"]), units.z["pos"]) if z is None else z
     flags = kf.predict(u) | kf.update("pos", z)
@@ -101,7 +101,7 @@ def test_arguments(pairs, name, raw, needs, capfd):
     needs("gcc")
     for what in ("z", "a"):
         kf, ref = (each.copy() for each in pairs[name])
-        unit = kf._units.z["pos"] if what == "z" else kf._units.u
+        unit = kf.struct.units.z["pos"] if what == "z" else kf.struct.units.u
         flags = step(kf, ref, AT, **{what: raw * float(unit[0]) if what == "a" else raw * unit})
         assert flags & ~int(Status.POINT_REJECTED) in (0, Status.SATURATED)
         assert what == "a" or flags & Status.SATURATED  # nis, at least
@@ -117,7 +117,7 @@ def test_states(pairs, name, raw, needs, capfd):
     for chosen in ((0,), (1,), (0, 1)):
         kf, ref = (each.copy() for each in pairs[name])
         x = kf.x
-        x[list(chosen)] = raw * kf._units.x[list(chosen)]
+        x[list(chosen)] = raw * kf.struct.units.x[list(chosen)]
         assert kf.set_state(x) & ~int(Status.SATURATED) == 0
         assert np.array_equal(kf.x, x)
         ref.set_state(x)
@@ -132,9 +132,9 @@ def test_covariances(pairs, name, needs, capfd):
     needs("gcc")
     kf, ref = (each.copy() for each in pairs[name])
     before = kf.P
-    assert kf.set_covariance(LIMITS[0] * kf._units.P) == Status.NOT_POSITIVE
+    assert kf.set_covariance(LIMITS[0] * kf.struct.units.P) == Status.NOT_POSITIVE
     assert np.array_equal(kf.P, before)
-    assert kf.set_covariance(np.diag(np.diag(LIMITS[1] * kf._units.P))) in (Status.OK, Status.SATURATED)
+    assert kf.set_covariance(np.diag(np.diag(LIMITS[1] * kf.struct.units.P))) in (Status.OK, Status.SATURATED)
     assert np.all(np.diag(kf.P) > 10 * np.diag(before))
     assert np.all(np.linalg.eigvalsh(kf.P) > 0)
     ref.set_covariance(kf.P)
@@ -148,7 +148,7 @@ def test_covariances(pairs, name, needs, capfd):
 def test_gates_ignore_them(pairs, name, raw, needs, capfd):
     needs("gcc")
     kf, ref = (each.copy() for each in pairs[name])
-    value, units = kf._value, kf._units
+    value, units = kf.struct.value, kf.struct.units
     u = value.to_physical(value.to_raw(np.array([LOG["a"][AT]]), units.u), units.u)
     kf.predict(u)
     ref.predict(u)

@@ -93,11 +93,11 @@ def follow(text, scalar="q16.16", steps=120, driven=(), **chosen):
     """Run C, interpreter and reference side by side; the largest error in sigma. driven: sensors that take inputs."""
     spec = override(loads(text) if "\n" in text else kfgen.load(text), scalar, filter=chosen)
     generated = build(spec)
-    kf = native.load_filters([(spec, generated.files)])[0]
+    kf = native.load_filters([generated])[0]
     twin, ref = Twin(generated), kfgen.reference(override(spec, "double"))
     twin.call("init")
     log = simulate.simulate(spec, steps, seed=5)
-    units, value = kf._units, kf._value
+    units, value = kf.struct.units, kf.struct.value
     worst = 0.0
     for k in range(steps):
         raw = value.to_raw(np.array([log.columns[name][k] for name in kf.inputs]), units.u)
@@ -245,9 +245,9 @@ def test_extreme_arguments_are_followed(what, sign):
         ref.predict()
         z = log.columns["pos.s"][k : k + 1]
         if k == 20 and what == "z":
-            z = sign * (2.0**31 - 1) * kf._units.z["pos"]
+            z = sign * (2.0**31 - 1) * kf.struct.units.z["pos"]
         if k == 20 and what == "x":
-            kf.set_state(sign * (2.0**31 - 1) * kf._units.x)
+            kf.set_state(sign * (2.0**31 - 1) * kf.struct.units.x)
             ref.set_state(kf.x)
         flags |= kf.update("pos", z)
         ref.update("pos", z)

@@ -130,20 +130,20 @@ def calls(kf: NativeFilter, steps: int, seed: int, size: float) -> Iterator[tupl
     """(function, arguments, keywords) of a random log."""
     random, n = np.random.default_rng(seed), len(kf.states)
     changes = ["set_state", "set_covariance", "indefinite", "not finite", "init"]
-    changes += ["redraw"] * kf._header.has("redraw")
+    changes += ["redraw"] * kf.struct.has("redraw")
     for step in range(steps):
         for _ in range(int(random.integers(0, 3))):
             keywords: dict[str, Any] = {}
             if kf.inputs:
                 keywords["u"] = random.normal(size=len(kf.inputs))
-            if kf._header.takes("predict", "dt"):
+            if kf.struct.takes("predict", "dt"):
                 keywords["dt"] = float(random.uniform(0.04, 0.16))
             yield "predict", [], keywords
         for sensor in kf.spec.measurements:
             m = len(sensor.components)
             z = size * random.normal(size=m) * (5 if random.random() < 0.2 else 1)
             keywords = {}
-            if kf._header.takes(f"update_{sensor.name}", "u"):
+            if kf.struct.takes(f"update_{sensor.name}", "u"):
                 keywords["u"] = random.normal(size=len(kf.inputs))
             if sensor.partial and random.random() < 0.5:
                 keywords["mask"] = int(random.integers(0, 1 << m))

@@ -21,10 +21,10 @@ class Calls:
         self.updates: dict[str, str] = {}  # function -> sensor
         for sensor in spec.measurements:
             for function in (f"update_{sensor.name}", f"update_{sensor.name}_masked"):
-                if kf._header.has(function):
+                if kf.struct.has(function):
                     self.updates[function] = sensor.name
         self.names = ["predict", *self.updates, "set_state"]
-        if kf._header.has("set_covariance"):
+        if kf.struct.has("set_covariance"):
             self.names.append("set_covariance")
         self.vectors: dict[str, dict[str, np.ndarray]] = {
             "set_state": {"x": np.full(n, 0.1)},
@@ -35,17 +35,17 @@ class Calls:
             if name != "predict":
                 m = len(kf.components(self.updates[name]))
                 self.vectors[name]["z"] = np.full(m, 0.1)
-            if kf._header.takes(name, "u"):
+            if kf.struct.takes(name, "u"):
                 self.vectors[name]["u"] = self.u
-            if kf._header.takes(name, "dt"):
+            if kf.struct.takes(name, "dt"):
                 self.vectors[name]["dt"] = np.array([0.1])
-            if kf._header.takes(name, "mask"):
+            if kf.struct.takes(name, "mask"):
                 self.vectors[name]["mask"] = np.array([(1 << m) - 1])
 
     def __call__(self, name: str, **changed: np.ndarray | None) -> int:
         """One call; an argument of None is a NULL pointer."""
-        kf, ffi = self.kf, self.kf._ffi
-        pointer = kf._kf if changed.pop("kf", 0) is not None else ffi.NULL
+        kf, ffi = self.kf, self.kf.struct.ffi
+        pointer = kf.struct.data if changed.pop("kf", 0) is not None else ffi.NULL
         arguments: list[Any] = []
         for key, good in self.vectors[name].items():
             value = changed.get(key, good)
@@ -58,7 +58,7 @@ class Calls:
             else:
                 struct = {"u": f"{kf.name}_inputs_t *", "z": f"{kf.name}_{self.updates.get(name)}_t *"}
                 arguments.append(ffi.new(struct.get(key, f"{kf.name}_real_t[]"), [float(v) for v in value]))
-        return int(getattr(kf._lib, f"{kf.name}_{name}")(pointer, *arguments))
+        return int(getattr(kf.struct.lib, f"{kf.name}_{name}")(pointer, *arguments))
 
 
 def refused(calls: Calls, status: int, name: str, **changed: np.ndarray | None) -> None:

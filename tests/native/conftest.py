@@ -12,6 +12,7 @@ from kfgen.native import NativeFilter, load_filters
 from kfgen.native.compiler import build
 from kfgen.spec import load
 from kfgen.spec.types import Spec
+from tests.native.small import vehicle_small
 
 HERE = Path(__file__).parent
 
@@ -44,9 +45,9 @@ def spec() -> Spec:
 
 @pytest.fixture(scope="session")
 def files() -> dict[str, str]:
-    return {name: (HERE / name).read_text() for name in ("vehicle_small.h", "vehicle_small.c")}
+    return dict(vehicle_small(load(HERE / "vehicle_small.yaml")).files)
 
 
 @pytest.fixture
-def kf(spec: Spec, files: dict[str, str]) -> NativeFilter:
-    return load_filters([(spec, files)])[0]
+def kf(spec: Spec) -> NativeFilter:
+    return load_filters([vehicle_small(spec)])[0]

@@ -265,10 +265,10 @@ def generated(name: str, form: str, scalar: str) -> Generated:
 @cache
 def _library(group: str, form: str, scalar: str, cache_folder: str, compiler: str) -> dict[str, NativeFilter]:
     names = list(GROUPS[group])
-    pairs = [(spec_of(name, form, scalar), generated(name, form, scalar).files) for name in names]
+    made = [generated(name, form, scalar) for name in names]
     flags = FLAGS["large"] if group == "exact" and form != "ud-bierman" else FLAGS[group]
     with locked(f"{group}-{form}-{scalar}-{compiler}"):
-        filters = load_filters(pairs, flags=flags)
+        filters = load_filters(made, flags=flags)
     return dict(zip(names, filters, strict=True))
 
 

@@ -197,4 +197,4 @@ def told(text: str, steps: int, jump: float = 0.0) -> list[tuple[str, dict[str, 
 
 def put_back(kf: NativeFilter, good: NativeFilter) -> None:
     """Every byte of the struct."""
-    kf._ffi.memmove(kf._kf, good._kf, len(bytes(good)))
+    kf.struct.ffi.memmove(kf.struct.data, good.struct.data, len(bytes(good)))

@@ -5,6 +5,7 @@ import pytest
 from kfgen.check import compare, tolerance_of
 from kfgen.native import load_filters
 from kfgen.reference import reference
+from tests.native.small import vehicle_small
 
 
 def test_a_right_filter_passes(kf, spec):
@@ -12,7 +13,6 @@ def test_a_right_filter_passes(kf, spec):
     assert outcome.passed
     assert outcome.P.error < 1e-5
     assert not outcome.differences
-    assert "passed" in outcome.text()
 
 
 @pytest.mark.parametrize(
@@ -29,9 +29,8 @@ def test_a_right_filter_passes(kf, spec):
 def test_a_wrong_filter_fails(spec, files, right, wrong):
     assert right in files["vehicle_small.c"]
     broken = {**files, "vehicle_small.c": files["vehicle_small.c"].replace(right, wrong)}
-    outcome = compare(load_filters([(spec, broken)])[0], reference(spec), 100)
+    outcome = compare(load_filters([vehicle_small(spec, broken)])[0], reference(spec), 100)
     assert not outcome.passed
-    assert "FAILED" in outcome.text()
 
 
 def test_tolerances():

@@ -202,4 +202,4 @@ filter: {type: ekf}
 def test_states_that_a_step_sets_to_an_input(covariance):
     """After predict they are known exactly and correlated with nothing, structurally."""
     outcome = check(override(loads(FORGETFUL), filter={"covariance": covariance}), steps=60)
-    assert outcome.passed, outcome.text()
+    assert outcome.passed, outcome

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from emitted import ALL, EXACT, FORMS, LIBM, SCALARS, generated
 
-from kfgen.generate import generate
+from kfgen.generate import build, generate
 from kfgen.ir.names import LIBRARY_NAMES
 from kfgen.native import load_filters
 from kfgen.override import override
@@ -264,7 +264,7 @@ def test_free_text_cannot_leave_its_comment():
 def test_hostile_names_compute_the_right_thing(form):
     """Locals, fields and arguments that share a name with a state are still told apart."""
     specs = [override(loads(text), "double", filter=FORMS[form]) for text in (HOSTILE, HOSTILE_TOO)]
-    filters = load_filters([(spec, generate(spec)) for spec in specs], flags=["-O0"])
+    filters = load_filters([build(spec) for spec in specs], flags=["-O0"])
     for spec, kf in zip(specs, filters, strict=True):
         ref = reference(spec)
         for k in range(20):

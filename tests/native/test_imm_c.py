@@ -26,7 +26,7 @@ def pairs(texts: Mapping[str, str], scalar: str = "double") -> dict[str, Pair]:
     """Banks with their references, by one call of the compiler."""
     specs = [replace(override(loads(text), scalar), name=f"bank_{k}") for k, text in enumerate(texts.values())]
     made = [build(spec) for spec in specs]
-    filters = load_filters([(s, m.files) for s, m in zip(specs, made, strict=True)], flags=["-O0"])
+    filters = load_filters(made, flags=["-O0"])
     return {key: Pair(*each) for key, *each in zip(texts, specs, made, filters, strict=True)}
 
 

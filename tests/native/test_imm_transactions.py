@@ -89,7 +89,7 @@ def test_an_error_in_any_mode_at_any_stage():
                 if ours >= ERROR:
                     assert bytes(kf) == before, place
                 met.add(ours)
-                kf._ffi.memmove(kf._kf, good, len(good))
+                kf.struct.ffi.memmove(kf.struct.data, good, len(good))
                 ref._estimate = pickle.loads(kept)
                 ref.parameters.update({each: GOOD[each[0]] for each in every})
     assert {Status.OK, Status.GATED, Status.NOT_FINITE, Status.NOT_POSITIVE} <= met
@@ -134,7 +134,7 @@ def moved() -> Iterator[tuple[NativeFilter, NativeFilter, Calls]]:
 
 
 def put_back(kf: NativeFilter, good: NativeFilter) -> None:
-    kf._ffi.memmove(kf._kf, good._kf, len(bytes(good)))
+    kf.struct.ffi.memmove(kf.struct.data, good.struct.data, len(bytes(good)))
 
 
 def test_wrong_arguments():
@@ -168,7 +168,7 @@ def test_spoiled_modes():
         ]  # fmt: skip
         for (path, i), bad, name in itertools.product(places, BAD, ("predict", *calls.updates)):
             put_back(kf, good)
-            owner = kf._kf
+            owner = kf.struct.data
             *outer, field = path.split(".")
             for part in outer:
                 owner = getattr(owner, part)
@@ -209,10 +209,10 @@ def test_a_gated_update():
                 continue
             gated.add((kf, name))
             count = f"gate_count_{sensor}"
-            assert getattr(kf._kf, count) == getattr(good._kf, count) + 1
+            assert getattr(kf.struct.data, count) == getattr(good.struct.data, count) + 1
             assert kf.nis != good.nis
-            kf._kf.nis = good._kf.nis
-            setattr(kf._kf, count, getattr(good._kf, count))
+            kf.struct.data.nis = good.struct.data.nis
+            setattr(kf.struct.data, count, getattr(good.struct.data, count))
             assert bytes(kf) == bytes(good)
     assert len(gated) == 4  # one mode of the second bank takes every place
 
@@ -251,7 +251,7 @@ def test_gates_of_the_modes_own():
             assert kf.nis == pytest.approx(ref.nis, rel=1e-12)
             np.testing.assert_allclose(kf.x, ref.x, rtol=1e-12)
             np.testing.assert_allclose(kf.mu, ref.mu, atol=1e-12)
-            if any(field.startswith("gate_count_") for field in kf._fields):
+            if any(field.startswith("gate_count_") for field in kf.struct.fields):
                 assert kf.gate_count == ref.gate_count
             seen.add(ours)
     assert seen == {Status.OK, Status.GATED, Status.ANOMALY}

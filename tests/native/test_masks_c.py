@@ -86,14 +86,14 @@ def test_bits_beyond_the_components_are_ignored():
         assert calls("update_fix_masked", z=z, mask=np.array([0b101])) == 0
         after = bytes(kf)
         assert after != bytes(start)
-        kf._ffi.memmove(kf._kf, start._kf, len(after))
+        kf.struct.ffi.memmove(kf.struct.data, start.struct.data, len(after))
         assert calls("update_fix_masked", z=z, mask=np.array([0xFFFFFFF8 | 0b101])) == 0
         assert bytes(kf) == after, key
 
 
 def test_only_partial_sensors_take_a_mask():
     kf = filters()["ud-bierman", OPTIONS[0]]
-    assert not kf._header.has("update_course_masked")
+    assert not kf.struct.has("update_course_masked")
     with pytest.raises(TypeError, match="partial"):
         kf.update("course", [3.0, 0.6], mask=1)
     with pytest.raises(TypeError, match="mask"):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from emitted import ALL, FORMS, locked, problems
 
-from kfgen.generate import generate
+from kfgen.generate import build
 from kfgen.native import NativeFilter, load_filters
 from kfgen.override import override
 from kfgen.reference import reference
@@ -31,15 +31,15 @@ PEER_FILES = {
 
 def built(texts: dict[str, str], scalar: str, flags: tuple[str, ...] = ("-O2",)) -> dict[tuple[str, str], NativeFilter]:
     """(name, form) -> filter, built by one call of the compiler."""
-    keys, pairs = [], []
+    keys, made = [], []
     for name, text in texts.items():
         for form, changes in FORMS.items():
             named = text.replace(f"name: {name}\n", f"name: {name}_{form.replace('-', '_')}\n")
             spec = override(loads(named), scalar, filter=changes)
             keys.append((name, form))
-            pairs.append((spec, generate(spec)))
+            made.append(build(spec))
     with locked(f"numerics-{scalar}-{'-'.join(texts)}"):
-        return dict(zip(keys, load_filters(pairs, flags=flags), strict=True))
+        return dict(zip(keys, load_filters(made, flags=flags), strict=True))
 
 
 def read(name: str) -> np.ndarray:

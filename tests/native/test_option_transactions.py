@@ -42,7 +42,7 @@ class Spoiled:
         self.good = kf.copy()
 
     def back(self) -> None:
-        self.kf._ffi.memmove(self.kf._kf, self.good._kf, len(bytes(self.good)))
+        self.kf.struct.ffi.memmove(self.kf.struct.data, self.good.struct.data, len(bytes(self.good)))
 
 
 def option_of(kf: NativeFilter) -> str:
@@ -90,11 +90,11 @@ def test_spoiled_filters():
     """NaN and infinity in what the options keep: refused without a change, or without a trace in the state."""
     for each in spoiled():
         kf = each.kf
-        for field in sorted(kf._fields & KEPT - {"x", "U", "D", "P"}):
+        for field in sorted(kf.struct.fields & KEPT - {"x", "U", "D", "P"}):
             for index, bad in itertools.product(range(len(kf.raw[field])), BAD):
                 for name in ("predict", *each.calls.updates):
                     each.back()
-                    getattr(kf._kf, field)[index] = bad
+                    getattr(kf.struct.data, field)[index] = bad
                     before = bytes(kf)
                     status = each.calls(name)
                     place = f"{kf}: {field}[{index}] = {bad}, {name}: {status:#x}"
@@ -136,14 +136,14 @@ def test_a_gated_update_says_nothing_else():
             each.back()
             m = len(kf.components(sensor))
             count = 1
-            setattr(kf._kf, f"gate_count_{sensor}", count)
+            setattr(kf.struct.data, f"gate_count_{sensor}", count)
             before = kf.copy()
             z = np.full(m, 60.0) if sensor == "fix" else np.array([0.5, -2.0])
             assert each.calls(name, z=z) == Status.GATED, (option_of(kf), name)
             assert kf.gate_count[sensor] == count + 1
             assert kf.nis > 20
-            setattr(kf._kf, f"gate_count_{sensor}", count)
-            kf._kf.nis = before._kf.nis
+            setattr(kf.struct.data, f"gate_count_{sensor}", count)
+            kf.struct.data.nis = before.struct.data.nis
             assert bytes(kf) == bytes(before), (option_of(kf), name)
 
 

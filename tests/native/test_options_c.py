@@ -81,9 +81,9 @@ CASES = {
 def unchanged(kf: NativeFilter, before: NativeFilter, gated: bool) -> bool:
     """Bit for bit; nis and the count of rejections aside for a gated update."""
     now = kf.copy()
-    for field in kf._fields if gated else ():
+    for field in kf.struct.fields if gated else ():
         if field == "nis" or field.startswith("gate_count"):
-            setattr(now._kf, field, getattr(before._kf, field))
+            setattr(now.struct.data, field, getattr(before.struct.data, field))
     return bytes(now) == bytes(before)
 
 
@@ -126,7 +126,7 @@ def follow(case: Case, filters: Mapping[str, NativeFilter], scalar: type = np.fl
             assert status == truth, f"{place}: {describe(status)} for {describe(truth)}"
             if status >= ERROR or status & GATED:
                 assert unchanged(kf, before, gated=status < ERROR), place
-            if ref.gate_count and hasattr(kf._kf, f"gate_count_{name}"):
+            if ref.gate_count and hasattr(kf.struct.data, f"gate_count_{name}"):
                 assert kf.gate_count[name] == ref.gate_count[name], place
             errors[form].add(kf, ref, case.options)
     assert seen == case.seen, describe(seen)
@@ -179,9 +179,9 @@ def test_the_root_in_and_out():
             wrong = np.eye(3)
             wrong[i, j] = bad
             assert kf.set_sqrt_covariance(wrong) == Status.NOT_FINITE
-    function = getattr(kf._lib, f"{kf.name}_set_sqrt_covariance")
-    assert function(kf._kf, kf._ffi.NULL) == function(kf._ffi.NULL, kf._ffi.new("double[9]")) == Status.NULL_ARGUMENT
-    getattr(kf._lib, f"{kf.name}_get_sqrt_covariance")(kf._kf, kf._ffi.NULL)  # nothing, and no crash
+    function, ffi = kf.struct.function("set_sqrt_covariance"), kf.struct.ffi
+    assert function(kf.struct.data, ffi.NULL) == function(ffi.NULL, ffi.new("double[9]")) == Status.NULL_ARGUMENT
+    kf.struct.function("get_sqrt_covariance")(kf.struct.data, ffi.NULL)  # nothing, and no crash
     assert bytes(kf) == before
     A = np.random.default_rng(1).normal(size=(3, 2))
     assert kf.set_covariance(A @ A.T) == 0  # of rank 2

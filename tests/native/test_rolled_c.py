@@ -253,16 +253,16 @@ def test_an_error_changes_nothing():
                         wrong = vector.copy()
                         wrong[i] = bad
                         refused(each, Status.NOT_FINITE, name, **{key: wrong})
-        covariance = sorted(kf._fields & {"U", "D", "P", "S"})
+        covariance = sorted(kf.struct.fields & {"U", "D", "P", "S"})
         for field, name in itertools.product(["x", *covariance], ("predict", *each.updates)):
             for index in {0, len(kf.raw[field]) // 2, len(kf.raw[field]) - 1}:
-                kf._ffi.memmove(kf._kf, good._kf, len(bytes(good)))
-                getattr(kf._kf, field)[index] = math.nan
+                kf.struct.ffi.memmove(kf.struct.data, good.struct.data, len(bytes(good)))
+                getattr(kf.struct.data, field)[index] = math.nan
                 before = bytes(kf)
                 if each(name) >= ERROR:
                     assert bytes(kf) == before, f"{kf}: {field}[{index}], {name}"
         for name, size in itertools.product(each.updates, (1e18, 1e30, 3e38)):
-            kf._ffi.memmove(kf._kf, good._kf, len(bytes(good)))
+            kf.struct.ffi.memmove(kf.struct.data, good.struct.data, len(bytes(good)))
             before = bytes(kf)
             if each(name, z=np.full_like(each.vectors[name]["z"], size)) >= ERROR:
                 assert bytes(kf) == before, f"{kf}: {name}({size})"

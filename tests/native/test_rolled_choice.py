@@ -10,7 +10,8 @@ import pytest
 from emitted import problems
 from variants import call
 
-from kfgen.commands.build import Built, table
+from kfgen.commands.build import Built, report
+from kfgen.commands.tables import lines
 from kfgen.errors import SpecError
 from kfgen.generate import Generated, build
 from kfgen.ir.program import Call, walk
@@ -66,7 +67,7 @@ def test_a_mixed_filter_computes_the_right_thing():
     called = {s.callee.name for f in made.code.functions for s in walk(f.body) if isinstance(s, Call)}
     assert called == {f.name for f in made.code.functions if f.private}
     assert len(set(names)) == len(names)
-    kf, ref = load_filters([(spec, made.files)])[0], reference(spec)
+    kf, ref = load_filters([made])[0], reference(spec)
     log = simulate(spec, 15, 2)
     for row in range(15):
         z = [log.columns[f"position.{name}"][row] for name in ("z1", "z3")]
@@ -89,10 +90,10 @@ def test_what_does_not_fit_is_told(unroll):
 
 def test_the_table_tells_the_forms(tmp_path):
     spec = chain(8, "auto", 4500, covariance="ud", update="bierman")
-    text = table([Built(spec, build(spec), {}, tmp_path)])
+    text = "\n".join(lines(*report([Built(spec, build(spec), {}, tmp_path)])))
     assert "predict: loops" in text
     assert "update_position: unrolled" in text
-    assert "loops" not in table([Built(chain(8), build(chain(8)), {}, tmp_path)])
+    assert "loops" not in "\n".join(lines(*report([Built(chain(8), build(chain(8)), {}, tmp_path)])))
 
 
 def test_a_single_state_has_nothing_to_loop_over():
@@ -113,7 +114,7 @@ def test_unscented_filters(covariance):
     made = [build(spec) for spec in (looped, straight)]
     assert flash(made[0]) < flash(made[1])
     assert set(made[0].summary.forms.values()) == {"loops"}
-    a, b = load_filters([(spec, each.files) for spec, each in zip((looped, straight), made, strict=True)])
+    a, b = load_filters(made)
     for k in range(20):
         for name, arguments in (("predict", {}), ("position", {"z": [0.1 * (k % 4)]})):
             assert call(a, name, arguments) == call(b, name, arguments) == 0

@@ -106,7 +106,7 @@ def riccati(F, Q, sensors) -> list[tuple[np.ndarray, np.ndarray]]:
 def gain(kf: NativeFilter, sensor: str) -> np.ndarray:
     """As the C applies it: the answer to a unit innovation in one component, at x = 0."""
     m, n = len(kf.components(sensor)), len(kf.states)
-    u = [0.0] if kf._header.takes(f"update_{sensor}", "u") else None
+    u = [0.0] if kf.struct.takes(f"update_{sensor}", "u") else None
     columns = []
     for i in range(m):
         kf.set_state(np.zeros(n))
@@ -162,12 +162,12 @@ def test_gate_and_errors():
     assert kf.update("second", [kf.x[2] + 2.5]) == Status.GATED
     assert kf.gate_count == {"second": 1}
     assert kf.nis > 10
-    kf._kf.nis, kf._kf.gate_count_second = before._kf.nis, 0
+    kf.struct.data.nis, kf.struct.data.gate_count_second = before.struct.data.nis, 0
     assert bytes(kf) == bytes(before)
     assert kf.update("second", [kf.x[2] + 0.1 - 2 * math.pi]) == 0
     with pytest.raises(AttributeError):
         kf.set_covariance(np.eye(4))
-    assert not kf._fields & {"U", "D", "P", "S"}
+    assert not kf.struct.fields & {"U", "D", "P", "S"}
     text = TRACK.replace("type: kf", "type: kf, gain: steady, covariance: sqrt")
     assert "set_sqrt" not in generate(loads(text))["track.h"]
 

@@ -44,10 +44,10 @@ def test_wrong_arguments(form, scalar):
                             if "u" in calls.vectors[name] and key == "z":  # the first of all that is wrong
                                 refused(calls, Status.NULL_ARGUMENT, name, **{key: wrong, "u": None})
             n = len(kf.states)
-            out = kf._ffi.new(f"{kf.name}_real_t[]", n * n)
-            getattr(kf._lib, f"{kf.name}_get_covariance")(kf._kf, kf._ffi.NULL)
-            getattr(kf._lib, f"{kf.name}_get_covariance")(kf._ffi.NULL, out)
-            assert getattr(kf._lib, f"{kf.name}_init")(kf._ffi.NULL) == Status.NULL_ARGUMENT
+            out = kf.struct.ffi.new(f"{kf.name}_real_t[]", n * n)
+            getattr(kf.struct.lib, f"{kf.name}_get_covariance")(kf.struct.data, kf.struct.ffi.NULL)
+            getattr(kf.struct.lib, f"{kf.name}_get_covariance")(kf.struct.ffi.NULL, out)
+            assert getattr(kf.struct.lib, f"{kf.name}_init")(kf.struct.ffi.NULL) == Status.NULL_ARGUMENT
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -87,7 +87,7 @@ def test_covariances_that_are_none(form, scalar):
 
 
 def poke(kf: NativeFilter, field: str, index: int, value: float) -> float:
-    array = getattr(kf._kf, field)
+    array = getattr(kf.struct.data, field)
     old = float(array[index])
     array[index] = value
     return old
@@ -102,11 +102,11 @@ def test_spoiled_filters(form):
             for function in calls.names[:-2]:
                 calls(function)
             good = kf.copy()
-            for field in [f for f in ("x", "U", "D", "P") if f in kf._fields]:
-                for index in range(len(getattr(kf._kf, field))):
+            for field in [f for f in ("x", "U", "D", "P") if f in kf.struct.fields]:
+                for index in range(len(getattr(kf.struct.data, field))):
                     for bad in (math.nan, -math.inf):
                         for function in calls.names[:-2]:
-                            kf._ffi.memmove(kf._kf, good._kf, kf._ffi.sizeof(kf._kf[0]))
+                            kf.struct.ffi.memmove(kf.struct.data, good.struct.data, len(bytes(good)))
                             poke(kf, field, index, bad)
                             before, x = bytes(kf), kf.x
                             status = calls(function)
@@ -141,7 +141,7 @@ def test_a_gated_update_leaves_all_but_nis(form):
             m = len(kf.components(sensor))
             assert calls(f"update_{sensor}", z=np.full(m, 1e3)) == Status.GATED
             assert kf.nis > 100
-            kf._kf.nis = before._kf.nis
+            kf.struct.data.nis = before.struct.data.nis
             assert bytes(kf) == bytes(before)
 
 
@@ -193,7 +193,7 @@ def test_models_that_blow_up(form):
             ):
                 spec = override(loads(text), scalar, filter=FORMS[form])
                 pairs.append((f"{kind}_{name}", name, spec))
-        filters = load_filters([(spec, build(spec).files) for _, _, spec in pairs], flags=["-O0"])
+        filters = load_filters([build(spec) for _, _, spec in pairs], flags=["-O0"])
         for (label, name, _), kf in zip(pairs, filters, strict=True):
             value = BLOW_UPS[name][2]
             if name == "product":
@@ -210,7 +210,7 @@ def test_the_first_error_wins(form):
     """NOT_FINITE stands before NOT_POSITIVE, whichever a variance or a value shows."""
     text = one_state("first", "exp(x)", "y + x/2").replace("Q: {x: q}", "Q: {x: q, y: q}")
     spec = override(loads(text), "float", filter=FORMS[form])
-    kf = load_filters([(spec, build(spec).files)])[0]
+    kf = load_filters([build(spec)])[0]
     for name in ("q", "r"):
         kf.init()
         kf.parameters[name] = -1e6
@@ -231,7 +231,7 @@ def test_limits_hide_nothing(form):
     bounded = one_state("bounded", "x + exp(w)", "x").replace("x: {init: 1, var", "x: {init: 1, bounds: [0, 2], var")
     capped = one_state("capped", "0.5*x + y", "x", extra=", variance_ceiling: 100, variance_floor: 1e-6")
     specs = [override(loads(text), "float", filter=FORMS[form]) for text in (bounded, capped)]
-    kf, ceiling = load_filters([(spec, build(spec).files) for spec in specs])
+    kf, ceiling = load_filters([build(spec) for spec in specs])
     wrong = []
     before = bytes(kf)
     if (status := kf.predict([1000])) != Status.NOT_FINITE or bytes(kf) != before:

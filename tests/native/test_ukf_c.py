@@ -80,9 +80,9 @@ class Errors:
 def unchanged(kf: NativeFilter, before: NativeFilter, gated: bool) -> bool:
     """Bit for bit; nis and the count of rejections aside for a gated update."""
     now = kf.copy()
-    for field in kf._fields if gated else ():
+    for field in kf.struct.fields if gated else ():
         if field == "nis" or field.startswith("gate_count"):
-            setattr(now._kf, field, getattr(before._kf, field))
+            setattr(now.struct.data, field, getattr(before.struct.data, field))
     return bytes(now) == bytes(before)
 
 
@@ -103,7 +103,7 @@ def follow(case: Case, form: str, filters: Mapping[str, NativeFilter]) -> dict[s
             assert status == truth, f"{place}: {describe(status)} for {describe(truth)}, errors so far {known}"
             if status >= ERROR or status & GATED:
                 assert unchanged(kf, before, gated=status < ERROR), place
-            if hasattr(kf._kf, f"gate_count_{name}"):
+            if hasattr(kf.struct.data, f"gate_count_{name}"):
                 assert kf.gate_count[name] == ref.gate_count[name], place
             errors[scalar].add(kf, ref, "adapt_R" in case.options)
     assert seen == case.seen, f"{form}: {describe(seen)}"

@@ -87,11 +87,11 @@ def test_wrong_arguments():
 def test_spoiled_filters():
     """NaN and infinity in what is kept: refused without a change, or without a trace in the state."""
     for kf, good, calls in moved():
-        for field in sorted(kf._fields & KEPT):
+        for field in sorted(kf.struct.fields & KEPT):
             for index, bad in itertools.product(range(len(kf.raw[field])), BAD):
                 for name in ("predict", *calls.updates):
                     put_back(kf, good)
-                    getattr(kf._kf, field)[index] = bad
+                    getattr(kf.struct.data, field)[index] = bad
                     before, x = bytes(kf), kf.x
                     status = calls(name)
                     place = f"{kf}: {field}[{index}] = {bad}, {name}: {describe(status)}"
@@ -131,15 +131,15 @@ def test_a_gated_update():
         assert calls(name, z=z) == Status.GATED, kf
         assert kf.gate_count[sensor] == before.gate_count[sensor] + 1
         assert kf.nis > 13
-        for field in kf._fields & {"nis", f"gate_count_{sensor}"}:
-            setattr(kf._kf, field, getattr(before._kf, field))
+        for field in kf.struct.fields & {"nis", f"gate_count_{sensor}"}:
+            setattr(kf.struct.data, field, getattr(before.struct.data, field))
         assert bytes(kf) == bytes(before), kf
-        if "kept" in kf._fields:
+        if "kept" in kf.struct.fields:
             assert kf.raw["kept"]
         other = good.copy()
         assert calls(name) == other.update(sensor, calls.vectors[name]["z"]) < ERROR
         assert bytes(kf) == bytes(other)
-        if "kept" in kf._fields:
+        if "kept" in kf.struct.fields:
             assert not kf.raw["kept"]
 
 

@@ -3,12 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from kfgen.emit.declarations import Declarations
 from kfgen.errors import KfgenError
 from kfgen.native import load_filters
-from kfgen.native.header import parse
 from kfgen.native.values import Fixed, Units, value_of
 from kfgen.spec import loads
 from kfgen.status import Status
+from tests.native.small import Written
 
 SPEC = """
 kfgen: 1
@@ -72,14 +73,30 @@ void level_get_covariance(const level_t *kf, level_real_t P[1]) { P[0] = kf->P[0
 """
 
 
+UNITS = {"H": 2.0**-10, "FLOW": 2.0**-16, "GAUGE_D": 2.0**-10, "GAIN": 2.0**-16, "DT": 2.0**-16}
+DECLARED = Declarations(
+    "level",
+    "int32_t",
+    HEADER[HEADER.index("typedef") :],
+    {
+        "init": ("kf",),
+        "predict": ("kf", "u", "dt"),
+        "update_gauge": ("kf", "z"),
+        "set_state": ("kf", "x"),
+        "get_covariance": ("kf", "P"),
+    },
+    16,
+    UNITS,
+)
+
+
 @pytest.fixture
 def level():
-    return load_filters([(loads(SPEC), {"level.h": HEADER, "level.c": CODE})])[0]
+    return load_filters([Written(loads(SPEC), {"level.h": HEADER, "level.c": CODE}, DECLARED)])[0]
 
 
 def test_units_of_a_fixed_point_filter():
-    header = parse(HEADER, "level")
-    units = Units(loads(SPEC), value_of(header))
+    units = Units(loads(SPEC), value_of(DECLARED))
     assert units.x == [2.0**-10]
     assert units.P == [[2.0**-20 * 2**16]]
     assert units.one == 2.0**-16
@@ -131,6 +148,5 @@ def test_a_log_in_fixed_point(level):
 
 
 def test_a_missing_unit_is_told():
-    header = parse(HEADER.replace("#define LEVEL_H_LSB 0.0009765625", ""), "level")
-    with pytest.raises(KfgenError, match="LEVEL_H_LSB"):
-        Fixed(header).unit("h")
+    with pytest.raises(KfgenError, match="H_LSB"):
+        Fixed({}, 16).unit("h")

@@ -103,7 +103,7 @@ def generated(specs: Mapping[Any, Spec]) -> dict[Any, Generated]:
 
 def compiled(made: Mapping[Any, Generated], flags: tuple[str, ...] = ("-O0",)) -> dict[Any, NativeFilter]:
     """By one call of the compiler."""
-    filters = load_filters([(each.code.model.spec, each.files) for each in made.values()], flags=flags)
+    filters = load_filters(list(made.values()), flags=flags)
     return dict(zip(made, filters, strict=True))
 
 

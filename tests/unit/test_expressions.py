@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kfgen.spec.constants import NotConstant, NoValue, value
+from kfgen.spec.constants import NotConstant, value
 from kfgen.spec.expressions import parse
 from kfgen.spec.lexer import ExpressionError, positions
+from kfgen.spec.operations import NoValue
 from kfgen.spec.tree import FUNCTIONS, Call, Name, Number, names
 
 

@@ -18,20 +18,22 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "kfgen"
 
-SPEC = {"errors", "spec"}
+SPEC = {"errors", "scalar_names", "spec"}
 ALLOWED = {
     # on nothing
     "errors": set(),
     "status": set(),
+    "interface": set(),
+    "scalar_names": set(),
     "files": {"errors"},
     # the spec, and what reads only it
-    "spec": {"errors"},
+    "spec": {"errors", "scalar_names"},
     "override": SPEC,
     "logs": SPEC | {"files"},
-    "reference": SPEC,
+    "reference": {"errors", "spec"},
     # from a spec to C
     "ir": {"errors"},
-    "scalars": {"errors", "ir"},
+    "scalars": {"errors", "ir", "scalar_names"},
     "quantiles": {"ir"},
     "geometry": {"ir"},
     "model": SPEC | {"geometry", "ir"},
@@ -42,10 +44,10 @@ ALLOWED = {
     "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars"},
     # the compiled filter, and what uses it
     "simulate": SPEC | {"geometry", "logs", "reference"},
-    "native": SPEC | {"files", "generate", "logs", "override", "status"},
+    "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
-    "check": SPEC | {"generate", "geometry", "native", "override", "reference", "simulate", "status"},
-    "cost": SPEC | {"logs", "native", "status"},
+    "check": SPEC | {"generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
+    "cost": SPEC | {"emit", "logs", "native", "status"},
     "selftest": SPEC
     | {"emit", "filters", "fixed", "generate", "geometry", "ir", "logs", "native", "reference", "scalars", "simulate"}
     | {"status"},

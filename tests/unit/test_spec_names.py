@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from kfgen.scalar_names import is_scalar
 from kfgen.spec import loads
-from kfgen.spec.names import identifiers, is_scalar, wrong_name
+from kfgen.spec.names import identifiers, wrong_name
 from kfgen.spec.reference import markdown
 from kfgen.spec.reserved import reserved
 from kfgen.spec.schema import RECORDS

@@ -6,8 +6,8 @@ import random
 from fractions import Fraction
 
 from kfgen.errors import Place
-from kfgen.spec.constants import Value
 from kfgen.spec.matrices import close, is_semidefinite, smallest_eigenvalue
+from kfgen.spec.operations import Value
 from kfgen.spec.problems import short
 from kfgen.spec.raw import BAD
 from kfgen.spec.rules.facts import Facts, Model, show

@@ -9,17 +9,8 @@ from fractions import Fraction
 import mpmath
 
 from kfgen.errors import Place
-from kfgen.spec.constants import (
-    NotConstant,
-    NoValue,
-    Value,
-    environment_of,
-    keep,
-    less,
-    real,
-    value,
-    with_parameters,
-)
+from kfgen.spec.constants import NotConstant, environment_of, keep, value, with_parameters
+from kfgen.spec.operations import NoValue, Value, less, real
 from kfgen.spec.problems import Problems
 from kfgen.spec.raw import BAD
 from kfgen.spec.scopes import Context, Scopes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kfgen.errors import Place
 from kfgen.spec.affine import Affine
-from kfgen.spec.constants import Value
+from kfgen.spec.operations import Value
 from kfgen.spec.problems import short
 from kfgen.spec.raw import BAD
 from kfgen.spec.rules.facts import Facts, Model

@@ -5,8 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.errors import Place
-from kfgen.spec.constants import Value, apply, less
 from kfgen.spec.matrices import close
+from kfgen.spec.operations import Value, apply, less
 from kfgen.spec.problems import short
 from kfgen.spec.rules.facts import Facts, show
 from kfgen.spec.tree import Expression

@@ -5,8 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.spec.affine import Affine
-from kfgen.spec.constants import Value, apply
 from kfgen.spec.matrices import close
+from kfgen.spec.operations import Value, apply
 from kfgen.spec.problems import short
 from kfgen.spec.raw import BAD
 from kfgen.spec.rules.facts import Facts, Model, show

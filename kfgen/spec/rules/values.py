@@ -5,13 +5,15 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import pairwise
 
-from kfgen.spec.constants import NotConstant, NoValue, Value, apply, less, truth, value
+from kfgen.scalar_names import DOUBLE, FLOAT
+from kfgen.spec.constants import NotConstant, truth, value
 from kfgen.spec.expressions import MAX_EXPONENT
+from kfgen.spec.operations import NoValue, Value, apply, less
 from kfgen.spec.rules.facts import Facts, Model, show
 from kfgen.spec.tree import Call, Name, Number, Tree
 from kfgen.spec.types import Filter, Range, Sensor
 
-_LARGEST = {"float": Fraction(2) ** 128, "double": Fraction(2) ** 1024}
+_LARGEST = {FLOAT: Fraction(2) ** 128, DOUBLE: Fraction(2) ** 1024}
 
 
 def check(facts: Facts) -> None:
@@ -42,7 +44,7 @@ def _foldable(facts: Facts) -> None:
             except NoValue as error:
                 facts.add(written.expression.place, error.message, error.hint)
                 continue
-            largest = _LARGEST.get("double" if written.path[0] == "constants" else facts.spec.scalar)
+            largest = _LARGEST.get(DOUBLE if written.path[0] == "constants" else facts.spec.scalar)
             if number is not None and largest is not None and not less(abs(number), largest):
                 text = f"the value {show(number)} is too large for {facts.spec.scalar}"
                 facts.add(written.expression.place, text, "choose other units, or `scalar: double`")

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kfgen.errors import Place
+from kfgen.spec.builders.values import Values
 from kfgen.spec.raw import Fields, Word, path_text
 from kfgen.spec.tree import Expression, Number
 from kfgen.spec.types import Adaptive, Filter, Matrix, Robust, SigmaPoints, State
 
-if TYPE_CHECKING:
-    from kfgen.spec.build import Builder
-
 
 class FilterBuilder:
-    def __init__(self, builder: Builder) -> None:
-        self.builder = builder
-        self.problems = builder.problems
+    """Builds the filter of the top or of a mode."""
+
+    def __init__(self, values: Values) -> None:
+        self.values = values
+        self.problems = values.problems
 
     def filter(self, f: Any, states: tuple[State, ...]) -> Filter:
         if not isinstance(f, Fields):
@@ -31,7 +31,7 @@ class FilterBuilder:
             type=kind,
             covariance=covariance,
             update=self.update(f, kind, covariance),
-            iterations=(self.builder.number(f.get("iterations")) or 3) if kind == "iekf" else None,
+            iterations=(self.values.number(f.get("iterations")) or 3) if kind == "iekf" else None,
             gain=f.get("gain"),
             sequential=f.get("sequential", False),
             sigma_points=self.sigma_points(f) if kind == "ukf" else None,
@@ -57,7 +57,7 @@ class FilterBuilder:
         if "update" not in f:
             return default
         chosen = f.get("update")
-        at = self.builder.walker.value_place(path_text((*f.path, "update")), f.places["update"])
+        at = self.values.walker.value_place(path_text((*f.path, "update")), f.places["update"])
         if covariance == "sqrt":
             self.problems.add(
                 f.places["update"],

@@ -1,0 +1,148 @@
+"""The raw data of the model -> states, noises, dynamics and sensors; of the top and of a mode alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kfgen.spec.builders.values import Values
+from kfgen.spec.raw import Fields, Word, entries, limits, matrix
+from kfgen.spec.tree import names
+from kfgen.spec.types import Component, Covariance, Definition, Dynamics, Gate, Noise, Sensor, State
+
+
+class ModelBuilder:
+    """Builds the parts of a model; each method takes the raw data under its key, whatever it may be."""
+
+    def __init__(self, values: Values) -> None:
+        self.values = values
+        self.problems = values.problems
+
+    def states(self, written: Any, covered: bool) -> tuple[State, ...]:
+        found = []
+        for name, f in entries(written):
+            kind, period = self.values.kind(f)
+            found.append(
+                State(
+                    name,
+                    self.values.formula(f, "init"),
+                    self.values.variance(f, covered),
+                    f.get("unit", ""),
+                    limits(f, "range"),
+                    kind,
+                    period,
+                    limits(f, "bounds"),
+                    f.get("doc", ""),
+                    f.place,
+                )
+            )
+        return tuple(found)
+
+    def definitions(self, written: Any) -> tuple[Definition, ...]:
+        """In an order in which each uses only those before it; a cycle is reported once."""
+        found = {name: Definition(name, expression) for name, expression in entries(written)}
+        order: list[Definition] = []
+        state: dict[str, int] = {}  # 1: on the way, 2: done
+
+        def visit(name: str, trail: list[str]) -> None:
+            stack: list[tuple[str, list[str]]] = [(name, used(found[name]))]
+            state[name] = 1
+            while stack:
+                current, rest = stack[-1]
+                if not rest:
+                    stack.pop()
+                    state[current] = 2
+                    order.append(found[current])
+                    continue
+                other = rest.pop()
+                if state.get(other) == 1:
+                    trail = [n for n, _ in stack]
+                    cycle = [*trail[trail.index(other) :], other]
+                    self.problems.add(
+                        found[cycle[0]].value.place,
+                        "the definitions use each other in a circle: " + " -> ".join(cycle),
+                        "break the circle",
+                    )
+                elif other not in state:
+                    state[other] = 1
+                    stack.append((other, used(found[other])))
+
+        def used(definition: Definition) -> list[str]:
+            return [n for n in reversed(list(dict.fromkeys(names(definition.value.tree)))) if n in found]
+
+        for name in found:
+            if name not in state:
+                visit(name, [])
+        return tuple(order)
+
+    def covariances(self, top: Fields) -> tuple[Covariance, ...]:
+        found = []
+        for triple in top.get("covariances", ()):
+            if triple is None:
+                continue
+            first, second, amount = triple
+            if isinstance(first, Word) and isinstance(second, Word):
+                found.append(Covariance(first.text, second.text, amount))
+        return tuple(found)
+
+    def noises(self, written: Any, covered: bool, densities: bool = True) -> tuple[Noise, ...]:
+        more = ("density", "root_density") if densities else ()
+        found = []
+        for name, f in entries(written):
+            variance = self.values.variance(f, covered, more=more)
+            density = "std" not in f and "var" not in f and ("density" in f or "root_density" in f)
+            found.append(Noise(name, variance, density, f.get("unit", ""), f.get("doc", ""), f.place))
+        return tuple(found)
+
+    def dynamics(self, f: Any) -> Dynamics:
+        if not isinstance(f, Fields):
+            return Dynamics()
+        noise = f.get("Q", {})
+        return Dynamics(
+            form=f.get("form", "discrete"),
+            f=dict(entries(f.get("f"))),
+            integrator=f.get("integrator", "rk4"),
+            substeps=max(1, self.values.number(f.get("substeps")) or 1),
+            Q=dict(entries(noise)) if isinstance(noise, Fields) else matrix(noise) or {},
+            place=f.place,
+        )
+
+    def sensors(self, written: Any) -> tuple[Sensor, ...]:
+        return tuple(self.sensor(name, f) for name, f in entries(written))
+
+    def sensor(self, name: str, f: Fields) -> Sensor:
+        noise = self.noises(f.get("noise"), "noise_covariance" in f, densities=False)
+        self.values.both(f, "R", f.get("z"))
+        self.values.both(f, "noise_covariance", f.get("noise"))
+        components = tuple(self.component(n, c, "R" in f, "noise" in f) for n, c in entries(f.get("z")))
+        gate = f.get("gate")
+        return Sensor(
+            name,
+            components,
+            matrix(f.get("R")),
+            noise,
+            matrix(f.get("noise_covariance")),
+            Gate(self.values.formula(gate, "probability"), self.values.number(gate.get("reset_after")))
+            if isinstance(gate, Fields)
+            else None,
+            f.get("partial", False),
+            f.get("doc", ""),
+            f.place,
+        )
+
+    def component(self, name: str, f: Fields, covered: bool, noisy: bool) -> Component:
+        kind, period = self.values.kind(f)
+        variance = self.values.variance(f, covered, needed=not noisy)
+        if "residual" in f and kind != "real":
+            self.problems.add(f.places["residual"], "`kind` wraps the residual already", "remove one of them")
+        return Component(
+            name,
+            self.values.formula(f, "h"),
+            variance,
+            f.get("unit", ""),
+            limits(f, "range"),
+            kind,
+            period,
+            f.get("residual"),
+            f.get("doc", ""),
+            f.place,
+        )

@@ -1,0 +1,132 @@
+"""The raw data of a whole file -> Spec: the top of it here, its parts by the other builders."""
+
+from __future__ import annotations
+
+from kfgen.scalar_names import FLOAT, KNOWN, is_scalar
+from kfgen.spec.builders.filter import FilterBuilder
+from kfgen.spec.builders.model import ModelBuilder
+from kfgen.spec.builders.modes import ModesBuilder
+from kfgen.spec.builders.values import Values
+from kfgen.spec.constants import keep
+from kfgen.spec.problems import short
+from kfgen.spec.raw import Fields, Word, entries, limits, matrix
+from kfgen.spec.tree import Expression
+from kfgen.spec.types import Code, Constant, Fixed, Initialize, Input, Parameter, Spec, Step
+from kfgen.spec.walk import Walker
+
+
+class Builder:
+    """Builds one spec; mistakes go to the walker's problems."""
+
+    def __init__(self, walker: Walker, top: Fields) -> None:
+        self.walker = walker
+        self.problems = walker.problems
+        self.top = top
+        self.values = Values(walker)
+        self.model = ModelBuilder(self.values)
+        self.filters = FilterBuilder(self.values)
+
+    def build(self, file: str, sha256: str) -> Spec:
+        top = self.top
+        constants = self.constants()
+        states = self.model.states(top.get("states"), covered="P0" in top)
+        self.values.both(top, "P0", top.get("states"))
+        self.values.both(top, "noise_covariance", top.get("noise"))
+        imm = top.get("imm")
+        spec = Spec(
+            name=top.get("name", ""),
+            file=file,
+            sha256=sha256,
+            description=top.get("description", ""),
+            scalar=self.scalar(),
+            constants=constants,
+            parameters=self.parameters(),
+            dt=self.step(),
+            states=states,
+            covariances=self.model.covariances(top),
+            P0=matrix(top.get("P0")),
+            initialize=self.initialize(),
+            inputs=self.inputs(),
+            noise=self.model.noises(top.get("noise"), "noise_covariance" in top),
+            noise_covariance=matrix(top.get("noise_covariance")),
+            let=self.model.definitions(top.get("let")),
+            dynamics=self.model.dynamics(top.get("dynamics")),
+            measurements=self.model.sensors(top.get("measurements")),
+            filter=self.filters.filter(top.get("filter"), states),
+            fixed=self.fixed(),
+            code=self.code(),
+            place=top.place,
+            places=dict(top.places),
+        )
+        if "P0" in top and "covariances" in top:
+            self.problems.add(top.at("covariances"), "`P0` is given too", "write the covariances into P0")
+        if not isinstance(imm, Fields):
+            return spec
+        return ModesBuilder(self.values, self.model, self.filters, top).with_modes(spec, imm)
+
+    def scalar(self) -> str:
+        text = self.top.get("scalar", FLOAT)
+        if not is_scalar(text):
+            at = self.walker.value_place("scalar", self.top.at("scalar"))
+            self.problems.add(at, f"there is no scalar {short(text)}", KNOWN)
+            return FLOAT
+        return str(text)
+
+    def constants(self) -> tuple[Constant, ...]:
+        found = []
+        for name, expression in entries(self.top.get("constants")):
+            found.append(Constant(name, expression))
+            keep(self.values.environment, name, expression.tree)
+        return tuple(found)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        return tuple(
+            Parameter(name, self.values.formula(f, "value"), f.get("unit", ""), limits(f, "range"), f.get("doc", ""))
+            for name, f in entries(self.top.get("parameters"))
+        )
+
+    def step(self) -> Step | None:
+        written = self.top.get("dt")
+        if isinstance(written, Fields):
+            return Step(self.values.formula(written, "nominal"), True, written.get("min"), written.get("max"))
+        if isinstance(written, Expression):
+            return Step(written)
+        return Step(self.values.bad(self.top.at("dt"))) if "dt" in self.top else None
+
+    def inputs(self) -> tuple[Input, ...]:
+        return tuple(
+            Input(name, f.get("unit", ""), limits(f, "range"), f.get("doc", ""))
+            for name, f in entries(self.top.get("inputs"))
+        )
+
+    def initialize(self) -> Initialize | None:
+        written = self.top.get("initialize")
+        if not isinstance(written, Fields):
+            return None
+        sensor = written.get("from")
+        states = {n: w.text for n, w in entries(written.get("states")) if isinstance(w, Word)}
+        return Initialize(sensor.text if isinstance(sensor, Word) else "", states)
+
+    # --- options
+
+    def fixed(self) -> Fixed:
+        f = self.top.get("fixed")
+        if not isinstance(f, Fields):
+            return Fixed()
+        scale = f.get("scale")
+        by_state = dict(entries(scale)) if isinstance(scale, Fields) else None
+        return Fixed(by_state, f.get("rounding", "nearest"), f.get("overflow", "saturate"))
+
+    def code(self) -> Code:
+        f = self.top.get("code")
+        if not isinstance(f, Fields):
+            return Code()
+        return Code(
+            f.get("unroll", "auto"),
+            self.values.number(f.get("flash")),
+            self.values.number(f.get("ram")),
+            self.values.number(f.get("stack")),
+            f.get("log_likelihood", False),
+            f.get("gate_count", False),
+            dict(f.places),
+        )
