@@ -58,6 +58,11 @@ class Mode:
         return f"kf.modes.{self.name}.{field}"
 
 
+def _of_mode(name: str, block: Block) -> Block:
+    """A field of a mode as one of the bank."""
+    return replace(block, name=f"modes.{name}.{block.name}", entries=tuple(f"{e}_{name}" for e in block.entries))
+
+
 class Imm:
     """Emits a bank of filters. bank: the model; filters: those of the modes; layouts: theirs, not in loops."""
 
@@ -75,9 +80,7 @@ class Imm:
         ]
         self.mixes_in_loops = alike([cast(Rolled, f.plain) for f in filters])
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
-        fields = [
-            replace(block, name=f"modes.{mode.name}.{block.name}") for mode in self.modes for block in mode.blocks
-        ]
+        fields = [_of_mode(mode.name, block) for mode in self.modes for block in mode.blocks]
         mu = Block("mu", len(self.modes), "probabilities of the modes", initial=bank.mu0)
         states = ("kf.x", *(mode.path("x") for mode in self.modes))
         self.outdated = outdated

@@ -7,7 +7,7 @@ update: see `sequence`. The filters that linearise otherwise are subclasses: iek
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import cast
 
@@ -95,6 +95,7 @@ class Ekf:
             adapted = self.adapted_R(sensor)
             extra += [] if adapted is None else adapted.blocks()
         extra += self.extra_blocks()
+        extra = [replace(block, entries=()) for block in extra] if layout.rolled else extra
         outdated = (self.outdated,) if self.outdated else ()
         self.covariance = CovarianceCode(model, layout, scalar.epsilon, self.outdated)
         self.state = StateCode(model, self.covariance.blocks(), tuple(extra), outdated)

@@ -5,6 +5,7 @@ They are part of the filter's state: kept full, or as factors (U above D) where 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
@@ -12,6 +13,7 @@ from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_nonnegative, assume_positive, is_zero, select
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.base import Block
+from kfgen.filters.covariance.names import entries
 from kfgen.filters.covariance.noise import Additive, Computed, Factored
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace, Value
@@ -31,13 +33,16 @@ def _constants(matrix: tuple[tuple[object, ...], ...]) -> list[list[Fraction]]:
 
 
 class Kept:
-    """A covariance in a field of the struct, dense or as its factors. initial: (k, k)."""
+    """A covariance in a field of the struct, dense or as its factors. initial: (k, k); names: of its k places."""
 
-    def __init__(self, field: str, initial: list[list[Fraction]], factored: bool, doc: str) -> None:
+    def __init__(
+        self, field: str, initial: list[list[Fraction]], factored: bool, doc: str, names: Sequence[str]
+    ) -> None:
         self.field = field
         self.k = len(initial)
         self.initial = initial
         self.factored = factored
+        self.names = names
         self.doc = doc + (": U above D, by columns" if factored else ": upper triangle by columns")
 
     def block(self) -> Block:
@@ -46,7 +51,7 @@ class Kept:
             U, D = linalg.udu([list(row) for row in self.initial])
             matrix = [[D[i] if i == j else U[i][j] for j in range(self.k)] for i in range(self.k)]
         flat = tuple(Fraction(matrix[i][j]) for j in range(self.k) for i in range(j + 1))
-        return Block(self.field, len(flat), self.doc, initial=flat)
+        return Block(self.field, len(flat), self.doc, initial=flat, entries=entries(self.field[0].lower(), self.names))
 
     def factors(self, t: Trace) -> tuple[Rows, Vector]:
         """U, D as they are kept. What is positive at first stays so: it is only ever multiplied and added to."""
@@ -97,7 +102,8 @@ class AdaptedR:
         self.rate = model.options.adapt_R
         self.m = len(sensor.h)
         self.residual_field = f"residual_{sensor.name}"
-        self.kept = Kept(f"R_{sensor.name}", _constants(sensor.R), factored, f"R of {sensor.name}, adapted")
+        names = [c.name for c in sensor.spec.components]
+        self.kept = Kept(f"R_{sensor.name}", _constants(sensor.R), factored, f"R of {sensor.name}, adapted", names)
         self.smallest = self.m * epsilon
         self.next: Symmetric | None = None
 
@@ -150,7 +156,8 @@ class AdaptedQ:
         assert model.options.adapt_Q is not None
         self.rate = model.options.adapt_Q
         Q = _constants(model.Q)
-        self.kept = Kept("Q", [[Q[i][j] for j in order] for i in order], factored, "additive process noise, adapted")
+        doc, names = "additive process noise, adapted", [model.states[i] for i in order]
+        self.kept = Kept("Q", [[Q[i][j] for j in order] for i in order], factored, doc, names)
         self.smallest = len(order) * epsilon
 
     def additive(self, t: Trace, added: Rows | None) -> Additive:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 
 from kfgen.filters.algebra.numbers import select
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.base import Layout
+from kfgen.filters.covariance.names import entries_of
 from kfgen.filters.covariance.ud.straight import column
 from kfgen.filters.steps.adapt import Kept
 from kfgen.ir.program import Argument, Function
@@ -32,7 +34,11 @@ class CovarianceCode:
     def blocks(self) -> tuple[Block, ...]:
         """The fields that hold it, at P0."""
         P0 = self.model.P0
-        return tuple(self.layout.blocks([[P0[i][j] for j in self.order] for i in self.order]))
+        blocks = self.layout.blocks([[P0[i][j] for j in self.order] for i in self.order])
+        if self.layout.rolled:
+            return tuple(blocks)
+        names = [self.model.states[i] for i in self.order]
+        return tuple(replace(block, entries=entries_of(block.name, names)) for block in blocks)
 
     def functions(self, taken: frozenset[str]) -> list[Function]:
         """The covariance in and out."""

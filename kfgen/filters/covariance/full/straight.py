@@ -12,6 +12,7 @@ from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Covariance, GainChange
 from kfgen.filters.covariance.gather import cholesky, factor_columns
+from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.ud.straight import column
 from kfgen.ir.program import Function
@@ -146,7 +147,7 @@ class Full:
         for last, j in enumerate(self.sequence if after_predict else range(self.n)):
             for i in self.sequence[: last + 1] if after_predict else range(j + 1):
                 low, high = min(i, j), max(i, j)
-                t.store("kf.P", packed(low, high), t.name(t.value(P[low, high]), f"p_{names[low]}_{names[high]}"))
+                t.store("kf.P", packed(low, high), t.name(t.value(P[low, high]), entry_next("p", names, low, high)))
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
         return assembled(U, D)

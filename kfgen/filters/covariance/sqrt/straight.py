@@ -26,6 +26,7 @@ from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.base import Covariance, GainChange
 from kfgen.filters.covariance.gather import columns_of, root_of_factors
+from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
 from kfgen.filters.covariance.ud.straight import column
 from kfgen.ir.program import Argument, Function
@@ -225,7 +226,7 @@ class Sqrt:
     def store(self, t: Trace, P: Rows, names: list[str], after_predict: bool) -> None:
         for i in reversed(range(self.n)):
             for j in reversed(range(i, self.n)):
-                t.store("kf.S", self.packed(i, j), t.name(t.value(P[i][j]), f"s_{names[i]}_{names[j]}"))
+                t.store("kf.S", self.packed(i, j), t.name(t.value(P[i][j]), entry_next("s", names, i, j)))
 
     def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
         """The root in and out."""

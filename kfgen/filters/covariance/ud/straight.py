@@ -12,6 +12,7 @@ from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Covariance, GainChange
 from kfgen.filters.covariance.gather import columns_of, factor_columns, root_of_factors
+from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
@@ -169,9 +170,9 @@ class UD:
         U, D = P
         for j in range(self.n):
             for i in range(j):
-                t.store("kf.U", packed(i, j), t.name(t.value(U[i][j]), f"u_{names[i]}_{names[j]}"))
+                t.store("kf.U", packed(i, j), t.name(t.value(U[i][j]), entry_next("u", names, i, j)))
         for j in range(self.n):
-            t.store("kf.D", j, t.name(t.value(D[j]), f"d_{names[j]}"))
+            t.store("kf.D", j, t.name(t.value(D[j]), entry_next("d", names, j)))
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> tuple[Rows, Vector]:
         return U, D
