@@ -48,7 +48,7 @@ class Full:
 
     def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
         flat = tuple(P0[i][j] for j in range(self.n) for i in range(j + 1))
-        return [Block("P", len(flat), "covariance, upper triangle column by column", initial=flat)]
+        return [Block("P", len(flat), "covariance: P_ij, i <= j, at j (j + 1) / 2 + i", initial=flat)]
 
     def load(self, t: Trace) -> Symmetric:
         return Symmetric(self.n, lambda i, j: t.element("kf.P", packed(i, j)))

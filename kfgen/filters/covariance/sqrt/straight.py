@@ -62,7 +62,7 @@ class Sqrt:
         for j in range(n):
             for i in range(j + 1):
                 values[self.packed(i, j)] = roots[j] * (1 if i == j else Fraction(U[i][j]))
-        doc = "lower triangular root by rows: P = S S^T"
+        doc = "lower triangular root, P = S S^T: S_ij, i >= j, at i (i + 1) / 2 + j"
         return [Block("S", len(values), doc, initial=tuple(values))]
 
     def load(self, t: Trace) -> Rows:

@@ -46,8 +46,8 @@ class UD:
         flat = tuple(Fraction(U[i][j]) for j in range(n) for i in range(j))
         out = []
         if n > 1:
-            out.append(Block("U", n * (n - 1) // 2, "unit upper triangular factor, strict upper triangle by columns",
-                             initial=flat))  # fmt: skip
+            doc = "unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i"
+            out.append(Block("U", n * (n - 1) // 2, doc, initial=flat))
         out.append(Block("D", n, "diagonal factor: P = U D U^T", initial=tuple(Fraction(d) for d in D)))
         return out
 
