@@ -12,8 +12,8 @@ from kfgen.emit.view import make_view
 from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
+from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.build import FixedFilter, build_fixed
-from kfgen.fixed.scalar import Fixed
 from kfgen.ir.count import operations
 from kfgen.ir.names import RESERVED
 from kfgen.logs import Log

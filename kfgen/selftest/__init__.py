@@ -11,7 +11,7 @@ import numpy as np
 from kfgen.emit.data import View
 from kfgen.emit.render import render_c
 from kfgen.emit.text import WIDTH
-from kfgen.fixed.scalar import Fixed
+from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.generate import Generated
 from kfgen.native.header import Header, parse
 from kfgen.scalars import SCALARS, Scalar

@@ -6,7 +6,7 @@ import numpy as np
 
 from kfgen.errors import KfgenError
 from kfgen.filters.base import FilterCode
-from kfgen.fixed.scalar import Fixed
+from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.ir import interpret
 from kfgen.native.header import Header
 from kfgen.native.values import Units, value_of

@@ -15,10 +15,10 @@ import numpy as np
 from cffi import FFI
 
 from kfgen.emit.render import macro
-from kfgen.fixed import tables
-from kfgen.fixed.arithmetic import Status
-from kfgen.fixed.routines import NEEDS, closure
-from kfgen.fixed.twins import TWINS, WITHOUT_STATUS
+from kfgen.fixed.arithmetic import tables
+from kfgen.fixed.arithmetic.operations import Status
+from kfgen.fixed.arithmetic.routines import NEEDS, closure
+from kfgen.fixed.arithmetic.twins import TWINS, WITHOUT_STATUS
 
 # routine -> its arguments: w an int64_t, h a positive one, l one of 52 bits, i a raw int32_t, m one below 2^30; other
 # letters are ints of a range of their own

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from kfgen.check import check
-from kfgen.fixed.certificate import certify, lines
+from kfgen.fixed.trial.certificate import certify, lines
 from kfgen.generate import build
 from kfgen.ir.program import roots, walk
 from kfgen.spec.loading import loads

@@ -8,7 +8,7 @@ import pytest
 import kfgen
 from kfgen import native, simulate
 from kfgen.errors import SpecError
-from kfgen.fixed.scalar import Fixed
+from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.generate import build
 from kfgen.ir import interpret
 from kfgen.override import override

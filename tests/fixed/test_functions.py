@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 from routines import ARGUMENTS, COMPILERS, RANGES, compiled, expected, source
 
-from kfgen.fixed.arithmetic import LIMIT, SATURATED, Status
-from kfgen.fixed.twins import TWINS
+from kfgen.fixed.arithmetic.limits import LIMIT
+from kfgen.fixed.arithmetic.operations import SATURATED, Status
+from kfgen.fixed.arithmetic.twins import TWINS
 
 # argument's and result's fraction bits; results of FLAT functions wobble by a bit where a step is far below that bit
 FORMATS = ((16, 16), (28, 30), (24, 24), (8, 8), (31, 16), (0, 29))

@@ -9,7 +9,7 @@ import pytest
 
 from kfgen.filters.build import build_filter
 from kfgen.filters.frame.shared import _Key
-from kfgen.fixed.scalar import Fixed
+from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.generate import UNROLLED, build
 from kfgen.ir.names import RESERVED
 from kfgen.override import override

@@ -8,7 +8,7 @@ from functools import cache
 import pytest
 from routines import ARGUMENTS, COMPILERS, NEEDS, RANGES, closure, compiled, expected
 
-from kfgen.fixed.arithmetic import FLOOR
+from kfgen.fixed.arithmetic.operations import FLOOR
 
 EXTREMES = (-(2**31), -(2**31) + 1, 2**31 - 1, 0, 1, -1, 2**30, -(2**30), 65536, -65536)
 BUILDS = [(compiler, (level,)) for compiler in COMPILERS for level in ("-O0", "-O2", "-O3")]

@@ -11,9 +11,9 @@ import pytest
 from cffi import FFI
 
 from kfgen.emit.render import macro
-from kfgen.fixed import tables
-from kfgen.fixed.routines import closure
-from kfgen.fixed.scalar import INSIDE, Fixed
+from kfgen.fixed.arithmetic import tables
+from kfgen.fixed.arithmetic.routines import closure
+from kfgen.fixed.arithmetic.scalar import INSIDE, Fixed
 from tests.boards.machines import BOARDS
 from tests.fixed.routines import COMPILERS, HEAD
 

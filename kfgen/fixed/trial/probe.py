@@ -1,0 +1,193 @@
+"""A short run of the integers beside the real numbers: whether what was chosen carries the filter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
+
+from kfgen.filters.base import FilterCode
+from kfgen.fixed.arithmetic.limits import LEAST, LIMIT
+from kfgen.fixed.arithmetic.scalar import Fixed
+from kfgen.fixed.formats.formats import Formats
+from kfgen.fixed.program.cells import Cell
+from kfgen.fixed.ranges.memory import Memory, blank
+from kfgen.fixed.ranges.real import RealProgram
+from kfgen.fixed.ranges.runs import Columns, elapsed, readings
+from kfgen.fixed.trial.integers import IntegerProgram
+
+SHAKEN = 2.0**-11  # of a covariance: what a format of 12 bits would lose in a step
+ERRORS = ("NOT_FINITE", "NOT_POSITIVE")
+
+
+@dataclass(frozen=True)
+class Departure:
+    """The largest error of the integers: of which state, in standard deviations, and after which row."""
+
+    state: int
+    sigmas: float
+    row: int
+    errors: int  # calls that only the integers refused
+    course: tuple[float, ...] = ()  # the error after each row
+    peaks: Mapping[int, int] = field(default_factory=dict)  # see `certificate.certify`
+
+    def beyond(self, other: Departure, least: float, factor: float) -> bool:
+        """Whether an error is larger than `least`, and than `factor` times what the other has had by then."""
+        had = accumulate(other.course, max)
+        return any(not ours <= max(least, factor * theirs) for ours, theirs in zip(self.course, had, strict=True))
+
+
+def shaken(real: RealProgram, code: FilterCode, formats: Formats, log: Columns, rows: int) -> Departure:
+    """How far real numbers depart from themselves by digits that no format keeps.
+
+    In every row of the second run x is rounded to its LSB, and the covariance is off by SHAKEN of itself.
+    """
+    return _Shaken(real, code, formats).run(log, rows)
+
+
+def probe(real: RealProgram, code: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed, log: Columns,
+          rows: int) -> Departure:  # fmt: skip
+    """Run both over a log, each from its own init."""
+    program = IntegerProgram(list(integer.functions), formats.arrays, scalar)
+    found = _Probe(real, program, code, formats, integer).run(log, rows)
+    return replace(found, peaks=program.peaks)
+
+
+class _Probe:
+    """Two filters over one log: `a` of real numbers, `b` of integers."""
+
+    def __init__(self, real: RealProgram, integer: RealProgram, code: FilterCode, formats: Formats,
+                 lowered: FilterCode) -> None:  # fmt: skip
+        self.real = real
+        self.integer = integer
+        self.code = code
+        self.names = {f.name for f in code.functions}
+        self.spec = code.model.spec
+        self.formats = formats
+        self.a = blank(code)
+        self.b = _integers(blank(lowered))
+        self.refused = 0
+
+    def raw(self, cell: Cell, value: float) -> int:
+        scaled = math.floor(math.ldexp(value, -self.formats.fixed[cell]) + 0.5)
+        return max(LEAST, min(LIMIT, scaled))
+
+    def give(self, cell: Cell, path: str, value: float) -> None:
+        """The same number to both: what the integers can carry."""
+        raw = self.raw(cell, value)
+        self.b.numbers[path] = raw
+        self.a.numbers[path] = math.ldexp(raw, self.formats.fixed[cell])
+
+    def call(self, function: str) -> None:
+        one, two = self.real.run(function, self.a), self.integer.run(function, self.b)
+        self.refused += two in ERRORS and one not in ERRORS
+
+    def run(self, log: Columns, rows: int) -> Departure:
+        self.call("init")
+        n = len(self.code.model.states)
+        run_time = self.spec.dt is not None and self.spec.dt.run_time
+        worst = Departure(0, 0.0, 0, 0)
+        course = []
+        for k in range(rows):
+            for each in self.spec.inputs:
+                self.give(("number", f"u.{each.name}"), f"u.{each.name}", float(log[each.name][k]))
+            step = elapsed(log, k) if run_time else 0.0
+            if run_time:
+                self.give(("number", "dt"), "dt", step)
+            if not run_time or step != 0:
+                self.call("predict")
+            for sensor in self.spec.measurements:
+                values = readings(log, sensor, k)
+                if any(map(math.isnan, values)):
+                    continue
+                for c, v in zip(sensor.components, values, strict=True):
+                    self.give(("number", f"update_{sensor.name}", f"z.{c.name}"), f"z.{c.name}", v)
+                self.call(f"update_{sensor.name}")
+            self.between()
+            state, sigmas = self._error(n)
+            course.append(sigmas)
+            if not sigmas <= worst.sigmas:
+                worst = Departure(state, sigmas, k, 0)
+        self._others()
+        return replace(worst, errors=self.refused, course=tuple(course))
+
+    def between(self) -> None:
+        """What is done after each row."""
+
+    def value(self, i: int) -> float:
+        """State i of b."""
+        return math.ldexp(self.b.arrays["kf.x"][i], self._lsb(i))
+
+    def _lsb(self, i: int) -> int:
+        return self.formats.fixed[self.formats.arrays.state(i)]
+
+    def _others(self) -> None:
+        """What the run has not needed, once, in integers only."""
+        for f in self.code.functions:
+            if f.private or f.name in ("init", "predict") or f"{f.name}_masked" in self.names:
+                continue
+            other = self.b.copy()
+            other.numbers["mask"] = 1
+            if f.name.startswith("set_"):
+                if f.name == "set_state":
+                    other.arrays["x"] = list(other.arrays["kf.x"])
+                elif f.name.replace("set_", "get_") in self.names:
+                    self.integer.run(f.name.replace("set_", "get_"), other)
+            if not f.name.startswith("update_") or f.name.endswith("_masked"):
+                self.integer.run(f.name, other)
+
+    def _error(self, n: int) -> tuple[int, float]:
+        variances = [math.inf] * n
+        if any(f.name == "get_covariance" for f in self.code.functions):
+            self.real.run("get_covariance", self.a)
+            variances = [self.a.arrays["P"][i * n + i] for i in range(n)]
+        worst = (0, 0.0)
+        for i in range(n):
+            error = abs(self.a.arrays["kf.x"][i] - self.value(i))
+            period = self.code.model.periods[i]
+            if period is not None:
+                error = abs(math.remainder(error, float(period)))
+            error = max(0.0, error - math.ldexp(4.0, self._lsb(i)))
+            sigma = math.sqrt(max(variances[i], 0.0))
+            ratio = error / sigma if sigma > 1e-9 * (1e-300 + abs(self.a.arrays["kf.x"][i])) else 0.0
+            if not ratio <= worst[1]:
+                worst = (i, ratio)
+        return worst
+
+
+class _Shaken(_Probe):
+    """`b` is of real numbers too, a little off."""
+
+    def __init__(self, real: RealProgram, code: FilterCode, formats: Formats) -> None:
+        super().__init__(real, real, code, formats, code)
+        self.b = blank(code)
+        self.sign = 1.0
+
+    def give(self, cell: Cell, path: str, value: float) -> None:
+        super().give(cell, path, value)
+        self.b.numbers[path] = self.a.numbers[path]
+
+    def value(self, i: int) -> float:
+        return float(self.b.arrays["kf.x"][i])
+
+    def between(self) -> None:
+        x = self.b.arrays["kf.x"]
+        for i in range(len(self.code.model.states)):
+            if math.isfinite(x[i]):
+                x[i] = math.ldexp(math.floor(math.ldexp(x[i], -self._lsb(i)) + 0.5), self._lsb(i))
+        if {"get_covariance", "set_covariance"} <= self.names:
+            self.real.run("get_covariance", self.b)
+            self.sign = -self.sign
+            self.b.arrays["P"] = [(1.0 + self.sign * SHAKEN) * p for p in self.b.arrays["P"]]
+            self.real.run("set_covariance", self.b)
+
+    def _others(self) -> None:
+        pass
+
+
+def _integers(memory: Memory) -> Memory:
+    return Memory(
+        {name: [0] * len(values) for name, values in memory.arrays.items()},
+        {name: value if isinstance(value, bool) else 0 for name, value in memory.numbers.items()},
+    )
