@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Set
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Call, Declare, For, If, Let, Slice, Statement, Store, mapped, walk
@@ -19,17 +19,27 @@ Place = tuple[str, int]
 _NUMBERED = re.compile(r"t\d+")
 
 
-def with_entries(body: list[Statement], names: Mapping[Place, str], taken: Set[str], prefix: str) -> list[Statement]:
+@dataclass(frozen=True)
+class Entry:
+    """What a number is called, and, of fixed point, the exponent of its raw 1."""
+
+    name: str
+    point: int | None = None
+
+
+def with_entries(
+    body: list[Statement], entries: Mapping[Place, Entry], taken: Set[str], prefix: str
+) -> list[Statement]:
     """The body with the entries that it reads under their names.
 
     taken: what no local may be called, beside the body's own locals. prefix: of the names of file scope.
     """
-    return _Naming(body, names, taken, prefix).run(body) if names else body
+    return _Naming(body, entries, taken, prefix).run(body) if entries else body
 
 
 class _Naming:
-    def __init__(self, body: list[Statement], names: Mapping[Place, str], taken: Set[str], prefix: str) -> None:
-        self.names = names
+    def __init__(self, body: list[Statement], entries: Mapping[Place, Entry], taken: Set[str], prefix: str) -> None:
+        self.entries = entries
         self.prefix = f"{prefix}_"
         self.taken = taken | {s.name for s in walk(body) if isinstance(s, Let | Declare)}
         self.bound: dict[Place, Node] = {}
@@ -60,7 +70,7 @@ class _Naming:
         """Loops and branches: what they read stays where it stands, but for what has a name already."""
         for inner in walk(statement.body):
             self._forget(inner)
-        free, self.names = self.names, {}
+        free, self.entries = self.entries, {}
 
         def inside(body: list[Statement]) -> list[Statement]:
             out = []
@@ -72,7 +82,7 @@ class _Naming:
         made = mapped(statement, self._node)
         assert isinstance(made, For | If)
         made = replace(made, body=inside(statement.body))
-        self.names = free
+        self.entries = free
         return made
 
     def _forget(self, statement: Statement) -> None:
@@ -81,11 +91,11 @@ class _Naming:
             case Store(name=name, index=index) if index is not None and index.constant is not None:
                 self._lose({(name, int(index.constant))})
             case Store(name=name):
-                self._lose({place for place in self.names if place[0] == name})
+                self._lose({place for place in self.entries if place[0] == name})
             case Call(callee=callee, args=args):
                 given = [g for a, g in zip(callee.arguments, args, strict=True) if not a.constant]
                 arrays = {g.array for g in given if isinstance(g, Slice)}
-                self._lose({place for place in self.names if "kf" in given or place[0] in arrays})
+                self._lose({place for place in self.entries if "kf" in given or place[0] in arrays})
             case _:
                 pass
 
@@ -98,7 +108,7 @@ class _Naming:
         if node.op != "element" or node.args[0].constant is None:
             return None
         place = (node.data, int(node.args[0].constant))
-        return place if place in self.names and place not in self.gone else None
+        return place if place in self.entries and place not in self.gone else None
 
     def _node(self, node: Node) -> Node:
         args = node.args
@@ -111,12 +121,13 @@ class _Naming:
         return node if made == args else Node(node.op, made, node.data, node.kind, node.serial, node.volatile)
 
     def _bind(self, place: Place, node: Node) -> Node:
-        base = name = self.names[place]
+        entry = self.entries[place]
+        base = name = entry.name
         count = 0
         while name in self.taken or (count == 0 and name.startswith(self.prefix)):
             count += 1
             name = f"{base}_{count}"
         self.taken |= {name}
         made = self.bound[place] = Node("variable", (), name, node.kind, node.serial, False)
-        self.fresh.append(Let(node, name))
+        self.fresh.append(Let(node, name, entry.point))
         return made

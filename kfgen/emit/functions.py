@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from kfgen.emit.data import FunctionView
-from kfgen.emit.entries import with_entries
+from kfgen.emit.entries import Entry, with_entries
 from kfgen.emit.fixed_point import may_saturate
 from kfgen.emit.printer import Printer
 from kfgen.emit.text import WIDTH, comment, fill, with_unit
@@ -31,7 +31,11 @@ class FunctionMaker:
         self.name = self.spec.name
         self.NAME = self.name.upper()
         self.helpers: set[str] = set()
-        self.entries = {(f"kf.{b.name}", i): name for b in code.blocks for i, name in enumerate(b.entries)}
+        self.entries = {
+            (f"kf.{b.name}", i): Entry(name, b.points[i] if b.points else None)
+            for b in code.blocks
+            for i, name in enumerate(b.entries)
+        }
         self.taken = frozenset(f"{self.name}_{f.name}" for f in code.functions) | set(tables.values())
 
     def make(self, f: Function) -> FunctionView:

@@ -17,6 +17,7 @@ class Block:
 
     compact: what is initially the same nearly everywhere is set everywhere first. entries: what each number is called
     where it is read by its place (`p_px_vx`); empty where numbers are read in loops.
+    points: of fixed point, the exponent of each number's raw 1.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Block:
     initial: tuple[Fraction, ...] = ()
     compact: bool = False
     entries: tuple[str, ...] = ()
+    points: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

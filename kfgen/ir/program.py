@@ -17,20 +17,22 @@ class Section:
 
 @dataclass(slots=True)
 class Let:
-    """A constant local: name = node."""
+    """A constant local: name = node. point: of fixed point, the value of its raw 1 is 2^point."""
 
     node: Node
     name: str
+    point: int | None = None
 
 
 @dataclass(slots=True)
 class Declare:
-    """A local array of reals, or (size None) a variable with its first value."""
+    """A local array of reals, or (size None) a variable with its first value. point: as that of a Let."""
 
     name: str
     size: int | None
     value: Node | None = None
     kind: str = "real"
+    point: int | None = None
 
 
 @dataclass(slots=True)

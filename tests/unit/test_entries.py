@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfgen.emit.entries import with_entries
+from kfgen.emit.entries import Entry, with_entries
 from kfgen.filters.covariance.names import LONGEST, entries_of, entry, entry_next
 from kfgen.ir.interpret import Memory, run
 from kfgen.ir.program import Argument, Call, Function, Let, Statement
@@ -10,12 +10,12 @@ from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace
 from kfgen.scalars import SCALARS
 
-NAMES = {("kf.P", 0): "p_a_a", ("kf.P", 1): "p_a_b", ("kf.P", 2): "p_b_b"}
+ENTRIES = {("kf.P", i): Entry(name) for i, name in enumerate(("p_a_a", "p_a_b", "p_b_b"))}
 KF = Argument("kf", "{name}_t", pointer=True, constant=False)
 
 
 def named(trace: Trace, prefix: str = "unit") -> list[Statement]:
-    return with_entries(schedule(trace), NAMES, frozenset(), prefix)
+    return with_entries(schedule(trace), ENTRIES, frozenset(), prefix)
 
 
 def lets(body: list[Statement]) -> list[str]:
@@ -68,7 +68,7 @@ def test_a_call_that_may_write_ends_a_name():
     t.call(Function("double", [KF], schedule(doubled), "", returns="void", private=True), ["kf"])
     after = Trace()
     after.store("kf.P", 0, after.element("kf.P", 1) * 1)
-    body = with_entries([*schedule(t), *schedule(after)], NAMES, frozenset(), "unit")
+    body = with_entries([*schedule(t), *schedule(after)], ENTRIES, frozenset(), "unit")
     assert lets(body) == ["p_a_b", "before"]
     assert isinstance(body[-2], Call)
     assert outcome(body) == [6.0, 6.0, 5.0, 4.0]
