@@ -48,6 +48,19 @@ def test_what_is_written_before_it_is_read_is_kept_under_its_name():
     assert outcome(body) == outcome(schedule(t)) == [6.0, 3.0, 5.0, 0.0]
 
 
+def test_what_the_program_holds_is_read_no_sooner_than_it_is_used():
+    t = Trace()
+    old = t.element("kf.P", 0)  # held from here on by the program, since it is written before its last use
+    double = t.name(t.element("kf.P", 1) * 2, "double")
+    t.store("kf.nis", None, double + old)
+    t.store("kf.P", 0, double)
+    t.store("kf.P", 1, old)
+    body = named(t)
+    assert lets(schedule(t)) == ["t0", "double"]
+    assert lets(body) == ["p_a_b", "double", "p_a_a"]
+    assert outcome(body) == outcome(schedule(t)) == [6.0, 2.0, 5.0, 8.0]
+
+
 def test_loops_and_branches_read_as_they_do():
     t = Trace()
     with t.loop("i", 0, 3) as i:
