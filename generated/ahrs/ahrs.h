@@ -97,7 +97,7 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     ahrs_real_t x[7];             /* state */
-    /* unit upper triangular factor, strict upper triangle by columns */
+    /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     ahrs_real_t U[21];
     ahrs_real_t D[7];             /* diagonal factor: P = U D U^T */
     ahrs_parameters_t parameters; /* may be changed while the filter runs */

@@ -84,29 +84,36 @@ battery_status_t battery_predict(battery_t *kf, const battery_inputs_t *u)
     const float v_slow_next = 0.9966722f * v_slow + 0.00007121458f * u->current;
 
     /* F U D U^T F^T + Q */
-    const float t0 = 0.95122945f * kf->U[2];
-    const float d_v_slow = 4.001268e-8f + 0.9933555f * kf->D[2];
-    const float t1 = 1.0f / d_v_slow;
-    const float t2 = 0.9966722f * kf->D[2] * t1;
-    const float t3 = kf->D[2] * (4.001268e-8f * t1);
-    const float u_soc_v_slow = t2 * kf->U[1] - 2.4124178e-11f * t1;
-    const float u_v_fast_v_slow = 9.203916e-11f * t1 + t2 * t0;
+    const float u_v_fast_v_slow = kf->U[2];
+    const float t0 = 0.95122945f * u_v_fast_v_slow;
+    const float d_v_slow = kf->D[2];
+    const float d_v_slow_next = 4.001268e-8f + 0.9933555f * d_v_slow;
+    const float t1 = 1.0f / d_v_slow_next;
+    const float t2 = 0.9966722f * d_v_slow * t1;
+    const float t3 = d_v_slow * (4.001268e-8f * t1);
+    const float u_soc_v_slow = kf->U[1];
+    const float u_soc_v_slow_next = t2 * u_soc_v_slow - 2.4124178e-11f * t1;
+    const float u_v_fast_v_slow_next = 9.203916e-11f * t1 + t2 * t0;
     const float t4 = t0 - 0.002292595f;
-    const float t5 = 2.5066794e-7f + 0.9048374f * kf->D[1];
+    const float d_v_fast = kf->D[1];
+    const float t5 = 2.5066794e-7f + 0.9048374f * d_v_fast;
     const float t6 = 1.0f / t5;
     const float t7 = t3 * t4;
-    const float d_v_fast = t5 + t4 * t7;
-    const float t8 = 1.0f / d_v_fast;
-    const float t9 = 0.95122945f * kf->D[1] * t6 * kf->U[0] - 1.7506921e-10f * t6;
-    const float t10 = kf->U[0] + 0.00066434895f;
-    const float t11 = kf->U[1] + 0.000600907f - t4 * t9;
-    const float u_soc_v_fast = t9 + t7 * t8 * t11;
-    const float d_soc = 1.4576473e-10f + kf->D[0] + t10 * (kf->D[1] * (2.5066794e-7f * t6) * t10)
+    const float d_v_fast_next = t5 + t4 * t7;
+    const float t8 = 1.0f / d_v_fast_next;
+    const float u_soc_v_fast = kf->U[0];
+    const float t9 = 0.95122945f * d_v_fast * t6 * u_soc_v_fast - 1.7506921e-10f * t6;
+    const float t10 = u_soc_v_fast + 0.00066434895f;
+    const float t11 = u_soc_v_slow + 0.000600907f - t4 * t9;
+    const float u_soc_v_fast_next = t9 + t7 * t8 * t11;
+    const float d_soc = kf->D[0];
+    const float d_soc_next = 1.4576473e-10f + d_soc + t10 * (d_v_fast * (2.5066794e-7f * t6) * t10)
         + t11 * (t3 * (t5 * t8) * t11);
     const float t12 = soc_next < 0.0f ? 0.0f : (soc_next > 1.0f ? 1.0f : soc_next);
 
     /* guards */
-    if (!battery_finite(t12 + v_fast_next + v_slow_next + soc_next + d_soc + d_v_fast + d_v_slow)) {
+    if (!battery_finite(t12 + v_fast_next + v_slow_next + soc_next + d_soc_next + d_v_fast_next
+        + d_v_slow_next)) {
         return BATTERY_NOT_FINITE;
     }
 
@@ -114,12 +121,12 @@ battery_status_t battery_predict(battery_t *kf, const battery_inputs_t *u)
     kf->x[BATTERY_SOC] = t12;
     kf->x[BATTERY_V_FAST] = v_fast_next;
     kf->x[BATTERY_V_SLOW] = v_slow_next;
-    kf->U[0] = u_soc_v_fast;
-    kf->U[1] = u_soc_v_slow;
-    kf->U[2] = u_v_fast_v_slow;
-    kf->D[0] = d_soc;
-    kf->D[1] = d_v_fast;
-    kf->D[2] = d_v_slow;
+    kf->U[0] = u_soc_v_fast_next;
+    kf->U[1] = u_soc_v_slow_next;
+    kf->U[2] = u_v_fast_v_slow_next;
+    kf->D[0] = d_soc_next;
+    kf->D[1] = d_v_fast_next;
+    kf->D[2] = d_v_slow_next;
     return BATTERY_OK;
 }
 
@@ -143,45 +150,52 @@ battery_status_t battery_update_terminal(battery_t *kf,
     const float t1 = 0.0004f + 0.01f * h_voltage_soc * h_voltage_soc;
 
     /* gain and covariance */
-    const float t2 = kf->U[0] * h_voltage_soc - 1.0f;
-    const float t3 = kf->U[1] * h_voltage_soc - kf->U[2] - 1.0f;
-    const float t4 = h_voltage_soc * (kf->D[0] * h_voltage_soc) + t2 * (kf->D[1] * t2)
-        + t3 * (kf->D[2] * t3);
+    const float u_soc_v_fast = kf->U[0];
+    const float t2 = u_soc_v_fast * h_voltage_soc - 1.0f;
+    const float u_soc_v_slow = kf->U[1];
+    const float u_v_fast_v_slow = kf->U[2];
+    const float t3 = u_soc_v_slow * h_voltage_soc - u_v_fast_v_slow - 1.0f;
+    const float d_soc = kf->D[0];
+    const float d_v_fast = kf->D[1];
+    const float d_v_slow = kf->D[2];
+    const float t4 = h_voltage_soc * (d_soc * h_voltage_soc) + t2 * (d_v_fast * t2)
+        + t3 * (d_v_slow * t3);
     const bool t5 = !(2.861023e-6f * (h_voltage_soc * h_voltage_soc
-        * (kf->D[0] + kf->U[0] * kf->D[1] * kf->U[0] + kf->U[1] * kf->D[2] * kf->U[1]) + kf->D[1]
-        + kf->U[2] * kf->D[2] * kf->U[2] + kf->D[2]) < t4) && t1 <= 0.0f && !(t4 < 0.0f);
+        * (d_soc + u_soc_v_fast * d_v_fast * u_soc_v_fast + u_soc_v_slow * d_v_slow * u_soc_v_slow)
+        + d_v_fast + u_v_fast_v_slow * d_v_slow * u_v_fast_v_slow + d_v_slow) < t4) && t1 <= 0.0f
+        && !(t4 < 0.0f);
     const float t6 = t5 ? 0.0f : h_voltage_soc;
     const float t7 = t5 ? 0.0f : -1.0f;
-    const float t8 = kf->D[0] * t6;
+    const float t8 = d_soc * t6;
     const float t9 = t1 + t6 * t8;
     const bool t10 = t9 > 1.1754944e-38f;
     const float t11 = t10 ? 1.0f / t9 : 0.0f;
     const float t12 = t8 * t11;
-    const float d_soc = kf->D[0] * (t10 ? t1 * t11 : 1.0f);
-    const float t13 = kf->U[0] * t6 + t7;
-    const float t14 = kf->D[1] * t13;
+    const float d_soc_next = d_soc * (t10 ? t1 * t11 : 1.0f);
+    const float t13 = u_soc_v_fast * t6 + t7;
+    const float t14 = d_v_fast * t13;
     const float t15 = t9 + t13 * t14;
     const bool t16 = t15 > 1.1754944e-38f;
     const float t17 = t16 ? 1.0f / t15 : 0.0f;
     const float t18 = t14 * t17;
-    const float d_v_fast = kf->D[1] * (t16 ? t9 * t17 : 1.0f);
-    const float u_soc_v_fast = kf->U[0] - t13 * t12;
-    const float t19 = t12 + t18 * u_soc_v_fast;
-    const float t20 = kf->U[1] * t6 + kf->U[2] * t7 + t7;
-    const float t21 = kf->D[2] * t20;
+    const float d_v_fast_next = d_v_fast * (t16 ? t9 * t17 : 1.0f);
+    const float u_soc_v_fast_next = u_soc_v_fast - t13 * t12;
+    const float t19 = t12 + t18 * u_soc_v_fast_next;
+    const float t20 = u_soc_v_slow * t6 + u_v_fast_v_slow * t7 + t7;
+    const float t21 = d_v_slow * t20;
     const float s_voltage = t15 + t20 * t21;
     const bool t22 = s_voltage > 1.1754944e-38f;
     const float t23 = 1.0f / s_voltage;
     const float t24 = t22 ? t23 : 0.0f;
     const float t25 = t21 * t24;
-    const float d_v_slow = kf->D[2] * (t22 ? t15 * t24 : 1.0f);
-    const float u_v_fast_v_slow = kf->U[2] - t20 * t18;
-    const float u_soc_v_slow = kf->U[1] - t20 * t19;
+    const float d_v_slow_next = d_v_slow * (t22 ? t15 * t24 : 1.0f);
+    const float u_v_fast_v_slow_next = u_v_fast_v_slow - t20 * t18;
+    const float u_soc_v_slow_next = u_soc_v_slow - t20 * t19;
     const float nis = s_voltage > 0.0f ? y_voltage * (y_voltage * t23) : 0.0f;
 
     /* state and innovation squared */
-    const float soc_next = soc + (t19 + t25 * u_soc_v_slow) * y_voltage;
-    const float v_fast_next = v_fast + (t18 + t25 * u_v_fast_v_slow) * y_voltage;
+    const float soc_next = soc + (t19 + t25 * u_soc_v_slow_next) * y_voltage;
+    const float v_fast_next = v_fast + (t18 + t25 * u_v_fast_v_slow_next) * y_voltage;
     const float v_slow_next = v_slow + t25 * y_voltage;
     const float t26 = soc_next < 0.0f ? 0.0f : (soc_next > 1.0f ? 1.0f : soc_next);
 
@@ -199,12 +213,12 @@ battery_status_t battery_update_terminal(battery_t *kf,
     kf->x[BATTERY_SOC] = t26;
     kf->x[BATTERY_V_FAST] = v_fast_next;
     kf->x[BATTERY_V_SLOW] = v_slow_next;
-    kf->U[0] = u_soc_v_fast;
-    kf->U[1] = u_soc_v_slow;
-    kf->U[2] = u_v_fast_v_slow;
-    kf->D[0] = d_soc;
-    kf->D[1] = d_v_fast;
-    kf->D[2] = d_v_slow;
+    kf->U[0] = u_soc_v_fast_next;
+    kf->U[1] = u_soc_v_slow_next;
+    kf->U[2] = u_v_fast_v_slow_next;
+    kf->D[0] = d_soc_next;
+    kf->D[1] = d_v_fast_next;
+    kf->D[2] = d_v_slow_next;
     kf->nis = nis;
     return BATTERY_OK;
 }

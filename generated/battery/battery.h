@@ -69,7 +69,7 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     battery_real_t x[3]; /* state */
-    battery_real_t U[3]; /* unit upper triangular factor, strict upper triangle by columns */
+    battery_real_t U[3]; /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     battery_real_t D[3]; /* diagonal factor: P = U D U^T */
     battery_real_t nis;  /* normalised innovation squared of the last update */
 } battery_t;

@@ -86,13 +86,13 @@ typedef struct {
 
 typedef struct {
     beetle_real_t x[4]; /* state */
-    beetle_real_t U[6]; /* unit upper triangular factor, strict upper triangle by columns */
+    beetle_real_t U[6]; /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     beetle_real_t D[4]; /* diagonal factor: P = U D U^T */
 } beetle_mode_run_t;
 
 typedef struct {
     beetle_real_t x[4]; /* state */
-    beetle_real_t U[6]; /* unit upper triangular factor, strict upper triangle by columns */
+    beetle_real_t U[6]; /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     beetle_real_t D[4]; /* diagonal factor: P = U D U^T */
 } beetle_mode_turn_t;
 

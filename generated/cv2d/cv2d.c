@@ -65,51 +65,60 @@ cv2d_status_t cv2d_predict(cv2d_t *kf, cv2d_real_t dt)
     const float t4 = 0.7886751f * step;
 
     /* F U, unit upper triangular as F is */
-    const float t5 = kf->U[0] + step;
-    const float t6 = kf->U[1] + step * kf->U[2];
-    const float t7 = kf->U[3] + step * kf->U[4];
-    const float t8 = kf->U[5] + step;
+    const float u_px_vx = kf->U[0];
+    const float t5 = u_px_vx + step;
+    const float u_px_py = kf->U[1];
+    const float u_vx_py = kf->U[2];
+    const float t6 = u_px_py + step * u_vx_py;
+    const float u_px_vy = kf->U[3];
+    const float u_vx_vy = kf->U[4];
+    const float t7 = u_px_vy + step * u_vx_vy;
+    const float u_py_vy = kf->U[5];
+    const float t8 = u_py_vy + step;
 
     /* process noise */
-    const float t9 = kf->D[3] + t3;
+    const float d_vy = kf->D[3];
+    const float t9 = d_vy + t3;
     const bool t10 = t9 > 0.0f;
-    const float t11 = t10 ? kf->D[3] / t9 : 1.0f;
+    const float t11 = t10 ? d_vy / t9 : 1.0f;
     const float t12 = t3 * t11;
-    const float d_vy = t9 + t3;
-    const bool t13 = d_vy > 0.0f;
-    const float t14 = t13 ? t9 / d_vy : 1.0f;
+    const float d_vy_next = t9 + t3;
+    const bool t13 = d_vy_next > 0.0f;
+    const float t14 = t13 ? t9 / d_vy_next : 1.0f;
     const float t15 = t3 * t14;
     const float t16 = t11 * t7;
-    const float u_px_vy = t14 * t16;
-    const float t17 = t11 * kf->U[4];
-    const float u_vx_vy = t14 * t17;
+    const float u_px_vy_next = t14 * t16;
+    const float t17 = t11 * u_vx_vy;
+    const float u_vx_vy_next = t14 * t17;
     const float t18 = t11 * t8 + (t10 ? t3 / t9 : 0.0f) * t2;
     const float t19 = t2 - t8;
-    const float u_py_vy = t14 * t18 + (t13 ? t3 / d_vy : 0.0f) * t4;
+    const float u_py_vy_next = t14 * t18 + (t13 ? t3 / d_vy_next : 0.0f) * t4;
     const float t20 = t4 - t18;
     const float t21 = t12 * t19;
-    const float t22 = kf->D[2] + t19 * t21;
+    const float d_py = kf->D[2];
+    const float t22 = d_py + t19 * t21;
     const bool t23 = t22 > 0.0f;
     const float t24 = t23 ? t21 / t22 : 0.0f;
-    const float t25 = t23 ? kf->D[2] / t22 : 1.0f;
+    const float t25 = t23 ? d_py / t22 : 1.0f;
     const float t26 = t12 * t25;
     const float t27 = t15 * t20;
-    const float d_py = t22 + t20 * t27;
-    const bool t28 = d_py > 0.0f;
-    const float t29 = t28 ? t27 / d_py : 0.0f;
-    const float t30 = t28 ? t22 / d_py : 1.0f;
+    const float d_py_next = t22 + t20 * t27;
+    const bool t28 = d_py_next > 0.0f;
+    const float t29 = t28 ? t27 / d_py_next : 0.0f;
+    const float t30 = t28 ? t22 / d_py_next : 1.0f;
     const float t31 = t15 * t30;
     const float t32 = t25 * t6 - t24 * t7;
     const float t33 = t7 + t19 * t6;
-    const float u_px_py = t30 * t32 - t29 * t16;
+    const float u_px_py_next = t30 * t32 - t29 * t16;
     const float t34 = t16 + t20 * t32;
-    const float t35 = t25 * kf->U[2] - t24 * kf->U[4];
-    const float t36 = kf->U[4] + t19 * kf->U[2];
-    const float u_vx_py = t30 * t35 - t29 * t17;
+    const float t35 = t25 * u_vx_py - t24 * u_vx_vy;
+    const float t36 = u_vx_vy + t19 * u_vx_py;
+    const float u_vx_py_next = t30 * t35 - t29 * t17;
     const float t37 = t17 + t20 * t35;
-    const float t38 = kf->D[1] + t3;
+    const float d_vx = kf->D[1];
+    const float t38 = d_vx + t3;
     const bool t39 = t38 > 0.0f;
-    const float t40 = t39 ? kf->D[1] / t38 : 1.0f;
+    const float t40 = t39 ? d_vx / t38 : 1.0f;
     const float t41 = t26 * t36;
     const float t42 = t38 + t36 * t41;
     const bool t43 = t42 > 0.0f;
@@ -118,36 +127,39 @@ cv2d_status_t cv2d_predict(cv2d_t *kf, cv2d_real_t dt)
     const bool t46 = t45 > 0.0f;
     const float t47 = t46 ? t42 / t45 : 1.0f;
     const float t48 = t31 * t37;
-    const float d_vx = t45 + t37 * t48;
-    const bool t49 = d_vx > 0.0f;
-    const float t50 = t49 ? t45 / d_vx : 1.0f;
+    const float d_vx_next = t45 + t37 * t48;
+    const bool t49 = d_vx_next > 0.0f;
+    const float t50 = t49 ? t45 / d_vx_next : 1.0f;
     const float t51 = t40 * t5 + (t39 ? t3 / t38 : 0.0f) * t2;
     const float t52 = t2 - t5;
     const float t53 = t44 * t51 - (t43 ? -(t41 / t42) : 0.0f) * t33;
     const float t54 = t36 * t51 - t33;
     const float t55 = t47 * t53 + (t46 ? t3 / t45 : 0.0f) * t4;
     const float t56 = t4 - t53;
-    const float u_px_vx = t50 * t55 - (t49 ? -(t48 / d_vx) : 0.0f) * t34;
+    const float u_px_vx_next = t50 * t55 - (t49 ? -(t48 / d_vx_next) : 0.0f) * t34;
     const float t57 = t37 * t55 - t34;
-    const float d_px = kf->D[0] + t52 * (t3 * t40 * t52) + t54 * (t26 * t44 * t54)
+    const float d_px = kf->D[0];
+    const float d_px_next = d_px + t52 * (t3 * t40 * t52) + t54 * (t26 * t44 * t54)
         + t56 * (t3 * t47 * t56) + t57 * (t31 * t50 * t57);
 
     /* guards */
-    if (!cv2d_finite(px_next + py_next + d_px + d_vx + d_py + d_vy)) { return CV2D_NOT_FINITE; }
+    if (!cv2d_finite(px_next + py_next + d_px_next + d_vx_next + d_py_next + d_vy_next)) {
+        return CV2D_NOT_FINITE;
+    }
 
     /* store */
     kf->x[CV2D_PX] = px_next;
     kf->x[CV2D_PY] = py_next;
-    kf->U[0] = u_px_vx;
-    kf->U[1] = u_px_py;
-    kf->U[2] = u_vx_py;
-    kf->U[3] = u_px_vy;
-    kf->U[4] = u_vx_vy;
-    kf->U[5] = u_py_vy;
-    kf->D[0] = d_px;
-    kf->D[1] = d_vx;
-    kf->D[2] = d_py;
-    kf->D[3] = d_vy;
+    kf->U[0] = u_px_vx_next;
+    kf->U[1] = u_px_py_next;
+    kf->U[2] = u_vx_py_next;
+    kf->U[3] = u_px_vy_next;
+    kf->U[4] = u_vx_vy_next;
+    kf->U[5] = u_py_vy_next;
+    kf->D[0] = d_px_next;
+    kf->D[1] = d_vx_next;
+    kf->D[2] = d_py_next;
+    kf->D[3] = d_vy_next;
     return flags;
 }
 
@@ -162,56 +174,67 @@ cv2d_status_t cv2d_update_camera(cv2d_t *kf, const cv2d_camera_t *z)
     const float y_y = z->y - py;
 
     /* gain and covariance: x, y */
-    const float t0 = 0.25f + kf->D[0];
+    const float d_px = kf->D[0];
+    const float t0 = 0.25f + d_px;
     const float t1 = 1.0f / t0;
-    const float t2 = kf->D[0] * t1;
-    const float d_px = kf->D[0] * (0.25f * t1);
-    const float t3 = kf->D[1] * kf->U[0];
-    const float t4 = t0 + kf->U[0] * t3;
+    const float t2 = d_px * t1;
+    const float d_px_next = d_px * (0.25f * t1);
+    const float d_vx = kf->D[1];
+    const float u_px_vx = kf->U[0];
+    const float t3 = d_vx * u_px_vx;
+    const float t4 = t0 + u_px_vx * t3;
     const float t5 = 1.0f / t4;
     const float t6 = t3 * t5;
-    const float d_vx = kf->D[1] * (t0 * t5);
-    const float u_px_vx = kf->U[0] - kf->U[0] * t2;
-    const float t7 = t2 + t6 * u_px_vx;
-    const float t8 = kf->D[2] * kf->U[1];
-    const float t9 = t4 + kf->U[1] * t8;
+    const float d_vx_next = d_vx * (t0 * t5);
+    const float u_px_vx_next = u_px_vx - u_px_vx * t2;
+    const float t7 = t2 + t6 * u_px_vx_next;
+    const float d_py = kf->D[2];
+    const float u_px_py = kf->U[1];
+    const float t8 = d_py * u_px_py;
+    const float t9 = t4 + u_px_py * t8;
     const float t10 = 1.0f / t9;
     const float t11 = t8 * t10;
-    const float t12 = kf->D[2] * (t4 * t10);
+    const float t12 = d_py * (t4 * t10);
     const float t13 = 0.25f + t12;
     const float t14 = 1.0f / t13;
     const float t15 = t12 * t14;
-    const float d_py = t12 * (0.25f * t14);
-    const float u_vx_py = kf->U[2] - kf->U[1] * t6;
-    const float t16 = t6 + t11 * u_vx_py;
-    const float t17 = t15 * u_vx_py;
-    const float u_px_py = kf->U[1] - kf->U[1] * t7;
-    const float t18 = t7 + t11 * u_px_py;
-    const float t19 = t15 * u_px_py;
-    const float t20 = kf->D[3] * kf->U[3];
-    const float s_x = t9 + kf->U[3] * t20;
+    const float d_py_next = t12 * (0.25f * t14);
+    const float u_vx_py = kf->U[2];
+    const float u_vx_py_next = u_vx_py - u_px_py * t6;
+    const float t16 = t6 + t11 * u_vx_py_next;
+    const float t17 = t15 * u_vx_py_next;
+    const float u_px_py_next = u_px_py - u_px_py * t7;
+    const float t18 = t7 + t11 * u_px_py_next;
+    const float t19 = t15 * u_px_py_next;
+    const float d_vy = kf->D[3];
+    const float u_px_vy = kf->U[3];
+    const float t20 = d_vy * u_px_vy;
+    const float s_x = t9 + u_px_vy * t20;
     const float t21 = 1.0f / s_x;
     const float t22 = t20 * t21;
-    const float t23 = kf->D[3] * (t9 * t21);
-    const float t24 = kf->U[5] - kf->U[3] * t11;
+    const float t23 = d_vy * (t9 * t21);
+    const float u_py_vy = kf->U[5];
+    const float t24 = u_py_vy - u_px_vy * t11;
     const float t25 = t23 * t24;
     const float s_y = t13 + t24 * t25;
     const float t26 = 1.0f / s_y;
     const float t27 = t25 * t26;
-    const float d_vy = t23 * (t13 * t26);
-    const float u_py_vy = t24 - t24 * t15;
-    const float t28 = kf->U[4] - kf->U[3] * t16;
-    const float u_vx_vy = t28 - t24 * t17;
-    const float t29 = kf->U[3] - kf->U[3] * t18;
-    const float u_px_vy = t29 - t24 * t19;
+    const float d_vy_next = t23 * (t13 * t26);
+    const float u_py_vy_next = t24 - t24 * t15;
+    const float u_vx_vy = kf->U[4];
+    const float t28 = u_vx_vy - u_px_vy * t16;
+    const float u_vx_vy_next = t28 - t24 * t17;
+    const float t29 = u_px_vy - u_px_vy * t18;
+    const float u_px_vy_next = t29 - t24 * t19;
     const float t30 = (t11 + t22 * t24) * y_x;
     const float nu_y = y_y - t30;
     const float nis = y_x * (y_x * t21) + nu_y * (nu_y * t26);
 
     /* state and innovation squared */
-    const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_vy) * nu_y;
-    const float vx_next = kf->x[CV2D_VX] + (t16 + t22 * t28) * y_x + (t17 + t27 * u_vx_vy) * nu_y;
-    const float py_next = py + t30 + (t15 + t27 * u_py_vy) * nu_y;
+    const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_vy_next) * nu_y;
+    const float vx_next = kf->x[CV2D_VX] + (t16 + t22 * t28) * y_x
+        + (t17 + t27 * u_vx_vy_next) * nu_y;
+    const float py_next = py + t30 + (t15 + t27 * u_py_vy_next) * nu_y;
     const float vy_next = kf->x[CV2D_VY] + t22 * y_x + t27 * nu_y;
 
     /* guards */
@@ -230,16 +253,16 @@ cv2d_status_t cv2d_update_camera(cv2d_t *kf, const cv2d_camera_t *z)
     kf->x[CV2D_PY] = py_next;
     kf->x[CV2D_VX] = vx_next;
     kf->x[CV2D_VY] = vy_next;
-    kf->U[0] = u_px_vx;
-    kf->U[1] = u_px_py;
-    kf->U[2] = u_vx_py;
-    kf->U[3] = u_px_vy;
-    kf->U[4] = u_vx_vy;
-    kf->U[5] = u_py_vy;
-    kf->D[0] = d_px;
-    kf->D[1] = d_vx;
-    kf->D[2] = d_py;
-    kf->D[3] = d_vy;
+    kf->U[0] = u_px_vx_next;
+    kf->U[1] = u_px_py_next;
+    kf->U[2] = u_vx_py_next;
+    kf->U[3] = u_px_vy_next;
+    kf->U[4] = u_vx_vy_next;
+    kf->U[5] = u_py_vy_next;
+    kf->D[0] = d_px_next;
+    kf->D[1] = d_vx_next;
+    kf->D[2] = d_py_next;
+    kf->D[3] = d_vy_next;
     kf->nis = nis;
     return CV2D_OK;
 }

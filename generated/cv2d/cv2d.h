@@ -73,7 +73,7 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     cv2d_real_t x[4];             /* state */
-    /* unit upper triangular factor, strict upper triangle by columns */
+    /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     cv2d_real_t U[6];
     cv2d_real_t D[4];             /* diagonal factor: P = U D U^T */
     cv2d_parameters_t parameters; /* may be changed while the filter runs */

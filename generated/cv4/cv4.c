@@ -56,64 +56,76 @@ cv4_status_t cv4_predict(cv4_t *kf)
     const float py_next = py + 0.1f * vy;
 
     /* F U, unit upper triangular as F is */
-    const float t0 = kf->U[0] + 0.1f;
-    const float t1 = kf->U[1] + 0.1f * kf->U[2];
-    const float t2 = kf->U[3] + 0.1f * kf->U[4];
-    const float t3 = kf->U[5] + 0.1f;
+    const float u_px_vx = kf->U[0];
+    const float t0 = u_px_vx + 0.1f;
+    const float u_px_py = kf->U[1];
+    const float u_vx_py = kf->U[2];
+    const float t1 = u_px_py + 0.1f * u_vx_py;
+    const float u_px_vy = kf->U[3];
+    const float u_vx_vy = kf->U[4];
+    const float t2 = u_px_vy + 0.1f * u_vx_vy;
+    const float u_py_vy = kf->U[5];
+    const float t3 = u_py_vy + 0.1f;
 
     /* process noise */
-    const float d_vy = kf->D[3] + 1.0e-6f;
-    const float t4 = kf->D[3] * (1.0f / d_vy);
+    const float d_vy = kf->D[3];
+    const float d_vy_next = d_vy + 1.0e-6f;
+    const float t4 = d_vy * (1.0f / d_vy_next);
     const float t5 = 1.0e-6f * t4;
-    const float u_px_vy = t4 * t2;
-    const float u_vx_vy = t4 * kf->U[4];
-    const float u_py_vy = t4 * t3;
-    const float t6 = kf->D[2] + 1.0e-6f;
-    const float t7 = kf->D[2] * (1.0f / t6);
+    const float u_px_vy_next = t4 * t2;
+    const float u_vx_vy_next = t4 * u_vx_vy;
+    const float u_py_vy_next = t4 * t3;
+    const float d_py = kf->D[2];
+    const float t6 = d_py + 1.0e-6f;
+    const float t7 = d_py * (1.0f / t6);
     const float t8 = 1.0e-6f * t7;
     const float t9 = t5 * t3;
-    const float d_py = t6 + t3 * t9;
-    const float t10 = 1.0f / d_py;
+    const float d_py_next = t6 + t3 * t9;
+    const float t10 = 1.0f / d_py_next;
     const float t11 = t9 * t10;
     const float t12 = t5 * (t6 * t10);
     const float t13 = t7 * t1;
     const float t14 = t3 * t13 - t2;
-    const float u_px_py = t13 - t11 * t14;
-    const float t15 = t7 * kf->U[2];
-    const float t16 = t3 * t15 - kf->U[4];
-    const float u_vx_py = t15 - t11 * t16;
-    const float t17 = kf->D[1] + 1.0e-6f;
-    const float t18 = kf->D[1] * (1.0f / t17);
-    const float t19 = t8 * kf->U[2];
-    const float t20 = t17 + kf->U[2] * t19;
+    const float u_px_py_next = t13 - t11 * t14;
+    const float t15 = t7 * u_vx_py;
+    const float t16 = t3 * t15 - u_vx_vy;
+    const float u_vx_py_next = t15 - t11 * t16;
+    const float d_vx = kf->D[1];
+    const float t17 = d_vx + 1.0e-6f;
+    const float t18 = d_vx * (1.0f / t17);
+    const float t19 = t8 * u_vx_py;
+    const float t20 = t17 + u_vx_py * t19;
     const float t21 = 1.0f / t20;
     const float t22 = t12 * t16;
-    const float d_vx = t20 + t16 * t22;
-    const float t23 = 1.0f / d_vx;
+    const float d_vx_next = t20 + t16 * t22;
+    const float t23 = 1.0f / d_vx_next;
     const float t24 = t18 * t0;
-    const float t25 = kf->U[2] * t24 - t1;
+    const float t25 = u_vx_py * t24 - t1;
     const float t26 = t24 - t19 * t21 * t25;
     const float t27 = t14 - t16 * t26;
-    const float u_px_vx = t26 + t22 * t23 * t27;
-    const float d_px = kf->D[0] + 1.0e-6f + t0 * (1.0e-6f * t18 * t0)
+    const float u_px_vx_next = t26 + t22 * t23 * t27;
+    const float d_px = kf->D[0];
+    const float d_px_next = d_px + 1.0e-6f + t0 * (1.0e-6f * t18 * t0)
         + t25 * (t8 * (t17 * t21) * t25) + t27 * (t12 * (t20 * t23) * t27);
 
     /* guards */
-    if (!cv4_finite(px_next + py_next + d_px + d_vx + d_py + d_vy)) { return CV4_NOT_FINITE; }
+    if (!cv4_finite(px_next + py_next + d_px_next + d_vx_next + d_py_next + d_vy_next)) {
+        return CV4_NOT_FINITE;
+    }
 
     /* store */
     kf->x[CV4_PX] = px_next;
     kf->x[CV4_PY] = py_next;
-    kf->U[0] = u_px_vx;
-    kf->U[1] = u_px_py;
-    kf->U[2] = u_vx_py;
-    kf->U[3] = u_px_vy;
-    kf->U[4] = u_vx_vy;
-    kf->U[5] = u_py_vy;
-    kf->D[0] = d_px;
-    kf->D[1] = d_vx;
-    kf->D[2] = d_py;
-    kf->D[3] = d_vy;
+    kf->U[0] = u_px_vx_next;
+    kf->U[1] = u_px_py_next;
+    kf->U[2] = u_vx_py_next;
+    kf->U[3] = u_px_vy_next;
+    kf->U[4] = u_vx_vy_next;
+    kf->U[5] = u_py_vy_next;
+    kf->D[0] = d_px_next;
+    kf->D[1] = d_vx_next;
+    kf->D[2] = d_py_next;
+    kf->D[3] = d_vy_next;
     return CV4_OK;
 }
 
@@ -128,56 +140,67 @@ cv4_status_t cv4_update_position(cv4_t *kf, const cv4_position_t *z)
     const float y_y = z->y - py;
 
     /* gain and covariance: x, y */
-    const float t0 = 400.0f + kf->D[0];
+    const float d_px = kf->D[0];
+    const float t0 = 400.0f + d_px;
     const float t1 = 1.0f / t0;
-    const float t2 = kf->D[0] * t1;
-    const float d_px = kf->D[0] * (400.0f * t1);
-    const float t3 = kf->D[1] * kf->U[0];
-    const float t4 = t0 + kf->U[0] * t3;
+    const float t2 = d_px * t1;
+    const float d_px_next = d_px * (400.0f * t1);
+    const float d_vx = kf->D[1];
+    const float u_px_vx = kf->U[0];
+    const float t3 = d_vx * u_px_vx;
+    const float t4 = t0 + u_px_vx * t3;
     const float t5 = 1.0f / t4;
     const float t6 = t3 * t5;
-    const float d_vx = kf->D[1] * (t0 * t5);
-    const float u_px_vx = kf->U[0] - kf->U[0] * t2;
-    const float t7 = t2 + t6 * u_px_vx;
-    const float t8 = kf->D[2] * kf->U[1];
-    const float t9 = t4 + kf->U[1] * t8;
+    const float d_vx_next = d_vx * (t0 * t5);
+    const float u_px_vx_next = u_px_vx - u_px_vx * t2;
+    const float t7 = t2 + t6 * u_px_vx_next;
+    const float d_py = kf->D[2];
+    const float u_px_py = kf->U[1];
+    const float t8 = d_py * u_px_py;
+    const float t9 = t4 + u_px_py * t8;
     const float t10 = 1.0f / t9;
     const float t11 = t8 * t10;
-    const float t12 = kf->D[2] * (t4 * t10);
+    const float t12 = d_py * (t4 * t10);
     const float t13 = 400.0f + t12;
     const float t14 = 1.0f / t13;
     const float t15 = t12 * t14;
-    const float d_py = t12 * (400.0f * t14);
-    const float u_vx_py = kf->U[2] - kf->U[1] * t6;
-    const float t16 = t6 + t11 * u_vx_py;
-    const float t17 = t15 * u_vx_py;
-    const float u_px_py = kf->U[1] - kf->U[1] * t7;
-    const float t18 = t7 + t11 * u_px_py;
-    const float t19 = t15 * u_px_py;
-    const float t20 = kf->D[3] * kf->U[3];
-    const float s_x = t9 + kf->U[3] * t20;
+    const float d_py_next = t12 * (400.0f * t14);
+    const float u_vx_py = kf->U[2];
+    const float u_vx_py_next = u_vx_py - u_px_py * t6;
+    const float t16 = t6 + t11 * u_vx_py_next;
+    const float t17 = t15 * u_vx_py_next;
+    const float u_px_py_next = u_px_py - u_px_py * t7;
+    const float t18 = t7 + t11 * u_px_py_next;
+    const float t19 = t15 * u_px_py_next;
+    const float d_vy = kf->D[3];
+    const float u_px_vy = kf->U[3];
+    const float t20 = d_vy * u_px_vy;
+    const float s_x = t9 + u_px_vy * t20;
     const float t21 = 1.0f / s_x;
     const float t22 = t20 * t21;
-    const float t23 = kf->D[3] * (t9 * t21);
-    const float t24 = kf->U[5] - kf->U[3] * t11;
+    const float t23 = d_vy * (t9 * t21);
+    const float u_py_vy = kf->U[5];
+    const float t24 = u_py_vy - u_px_vy * t11;
     const float t25 = t23 * t24;
     const float s_y = t13 + t24 * t25;
     const float t26 = 1.0f / s_y;
     const float t27 = t25 * t26;
-    const float d_vy = t23 * (t13 * t26);
-    const float u_py_vy = t24 - t24 * t15;
-    const float t28 = kf->U[4] - kf->U[3] * t16;
-    const float u_vx_vy = t28 - t24 * t17;
-    const float t29 = kf->U[3] - kf->U[3] * t18;
-    const float u_px_vy = t29 - t24 * t19;
+    const float d_vy_next = t23 * (t13 * t26);
+    const float u_py_vy_next = t24 - t24 * t15;
+    const float u_vx_vy = kf->U[4];
+    const float t28 = u_vx_vy - u_px_vy * t16;
+    const float u_vx_vy_next = t28 - t24 * t17;
+    const float t29 = u_px_vy - u_px_vy * t18;
+    const float u_px_vy_next = t29 - t24 * t19;
     const float t30 = (t11 + t22 * t24) * y_x;
     const float nu_y = y_y - t30;
     const float nis = y_x * (y_x * t21) + nu_y * (nu_y * t26);
 
     /* state and innovation squared */
-    const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_vy) * nu_y;
-    const float vx_next = kf->x[CV4_VX] + (t16 + t22 * t28) * y_x + (t17 + t27 * u_vx_vy) * nu_y;
-    const float py_next = py + t30 + (t15 + t27 * u_py_vy) * nu_y;
+    const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_vy_next) * nu_y;
+    const float vx_next = kf->x[CV4_VX] + (t16 + t22 * t28) * y_x
+        + (t17 + t27 * u_vx_vy_next) * nu_y;
+    const float py_next = py + t30 + (t15 + t27 * u_py_vy_next) * nu_y;
     const float vy_next = kf->x[CV4_VY] + t22 * y_x + t27 * nu_y;
 
     /* guards */
@@ -189,16 +212,16 @@ cv4_status_t cv4_update_position(cv4_t *kf, const cv4_position_t *z)
     kf->x[CV4_PY] = py_next;
     kf->x[CV4_VX] = vx_next;
     kf->x[CV4_VY] = vy_next;
-    kf->U[0] = u_px_vx;
-    kf->U[1] = u_px_py;
-    kf->U[2] = u_vx_py;
-    kf->U[3] = u_px_vy;
-    kf->U[4] = u_vx_vy;
-    kf->U[5] = u_py_vy;
-    kf->D[0] = d_px;
-    kf->D[1] = d_vx;
-    kf->D[2] = d_py;
-    kf->D[3] = d_vy;
+    kf->U[0] = u_px_vx_next;
+    kf->U[1] = u_px_py_next;
+    kf->U[2] = u_vx_py_next;
+    kf->U[3] = u_px_vy_next;
+    kf->U[4] = u_vx_vy_next;
+    kf->U[5] = u_py_vy_next;
+    kf->D[0] = d_px_next;
+    kf->D[1] = d_vx_next;
+    kf->D[2] = d_py_next;
+    kf->D[3] = d_vy_next;
     kf->nis = nis;
     return CV4_OK;
 }

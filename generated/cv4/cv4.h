@@ -69,7 +69,7 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     cv4_real_t x[4]; /* state */
-    cv4_real_t U[6]; /* unit upper triangular factor, strict upper triangle by columns */
+    cv4_real_t U[6]; /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     cv4_real_t D[4]; /* diagonal factor: P = U D U^T */
     cv4_real_t nis;  /* normalised innovation squared of the last update */
 } cv4_t;

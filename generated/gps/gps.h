@@ -89,7 +89,7 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     gps_real_t x[5];  /* state */
-    gps_real_t U[10]; /* unit upper triangular factor, strict upper triangle by columns */
+    gps_real_t U[10]; /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     gps_real_t D[5];  /* diagonal factor: P = U D U^T */
     gps_real_t nis;   /* normalised innovation squared of the last update */
 } gps_t;

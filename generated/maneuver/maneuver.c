@@ -211,77 +211,119 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     const float th_cruise_1 = maneuver_wrap(th_base_cruise + t31 + w_turn_cruise * t37, 3.1415927f);
     const float t41 = t14 * t27;
     const float t42 = t34 * t40;
-    const float p_px_px_cruise = w_cruise_cruise * kf->modes.cruise.P[0]
-        + w_speed_cruise * kf->modes.speed.P[0] + w_turn_cruise * kf->modes.turn.P[0] + t41 * t14
-        + t42 * t34;
-    const float p_px_py_cruise = w_cruise_cruise * kf->modes.cruise.P[1]
-        + w_speed_cruise * kf->modes.speed.P[1] + w_turn_cruise * kf->modes.turn.P[1] + t41 * t15
-        + t42 * t35;
+    const float p_px_px_cruise = kf->modes.cruise.P[0];
+    const float p_px_px_speed = kf->modes.speed.P[0];
+    const float p_px_px_turn = kf->modes.turn.P[0];
+    const float p_px_px_next_cruise = w_cruise_cruise * p_px_px_cruise
+        + w_speed_cruise * p_px_px_speed + w_turn_cruise * p_px_px_turn + t41 * t14 + t42 * t34;
+    const float p_px_py_cruise = kf->modes.cruise.P[1];
+    const float p_px_py_speed = kf->modes.speed.P[1];
+    const float p_px_py_turn = kf->modes.turn.P[1];
+    const float p_px_py_next_cruise = w_cruise_cruise * p_px_py_cruise
+        + w_speed_cruise * p_px_py_speed + w_turn_cruise * p_px_py_turn + t41 * t15 + t42 * t35;
     const float t43 = t15 * t27;
     const float t44 = t35 * t40;
-    const float p_py_py_cruise = w_cruise_cruise * kf->modes.cruise.P[2]
-        + w_speed_cruise * kf->modes.speed.P[2] + w_turn_cruise * kf->modes.turn.P[2] + t43 * t15
-        + t44 * t35;
-    const float p_px_v_cruise = w_cruise_cruise * kf->modes.cruise.P[3]
-        + w_speed_cruise * kf->modes.speed.P[3] + w_turn_cruise * kf->modes.turn.P[3] + t41 * t16
-        + t42 * t36;
-    const float p_py_v_cruise = w_cruise_cruise * kf->modes.cruise.P[4]
-        + w_speed_cruise * kf->modes.speed.P[4] + w_turn_cruise * kf->modes.turn.P[4] + t43 * t16
-        + t44 * t36;
+    const float p_py_py_cruise = kf->modes.cruise.P[2];
+    const float p_py_py_speed = kf->modes.speed.P[2];
+    const float p_py_py_turn = kf->modes.turn.P[2];
+    const float p_py_py_next_cruise = w_cruise_cruise * p_py_py_cruise
+        + w_speed_cruise * p_py_py_speed + w_turn_cruise * p_py_py_turn + t43 * t15 + t44 * t35;
+    const float p_px_v_cruise = kf->modes.cruise.P[3];
+    const float p_px_v_speed = kf->modes.speed.P[3];
+    const float p_px_v_turn = kf->modes.turn.P[3];
+    const float p_px_v_next_cruise = w_cruise_cruise * p_px_v_cruise + w_speed_cruise * p_px_v_speed
+        + w_turn_cruise * p_px_v_turn + t41 * t16 + t42 * t36;
+    const float p_py_v_cruise = kf->modes.cruise.P[4];
+    const float p_py_v_speed = kf->modes.speed.P[4];
+    const float p_py_v_turn = kf->modes.turn.P[4];
+    const float p_py_v_next_cruise = w_cruise_cruise * p_py_v_cruise + w_speed_cruise * p_py_v_speed
+        + w_turn_cruise * p_py_v_turn + t43 * t16 + t44 * t36;
     const float t45 = t16 * t27;
     const float t46 = t36 * t40;
-    const float p_v_v_cruise = w_cruise_cruise * kf->modes.cruise.P[5]
-        + w_speed_cruise * kf->modes.speed.P[5] + w_turn_cruise * kf->modes.turn.P[5] + t45 * t16
-        + t46 * t36;
-    const float p_px_th_cruise = w_cruise_cruise * kf->modes.cruise.P[6]
-        + w_speed_cruise * kf->modes.speed.P[6] + w_turn_cruise * kf->modes.turn.P[6] + t41 * t26
-        + t42 * t37;
-    const float p_py_th_cruise = w_cruise_cruise * kf->modes.cruise.P[7]
-        + w_speed_cruise * kf->modes.speed.P[7] + w_turn_cruise * kf->modes.turn.P[7] + t43 * t26
-        + t44 * t37;
-    const float p_v_th_cruise = w_cruise_cruise * kf->modes.cruise.P[8]
-        + w_speed_cruise * kf->modes.speed.P[8] + w_turn_cruise * kf->modes.turn.P[8] + t45 * t26
-        + t46 * t37;
+    const float p_v_v_cruise = kf->modes.cruise.P[5];
+    const float p_v_v_speed = kf->modes.speed.P[5];
+    const float p_v_v_turn = kf->modes.turn.P[5];
+    const float p_v_v_next_cruise = w_cruise_cruise * p_v_v_cruise + w_speed_cruise * p_v_v_speed
+        + w_turn_cruise * p_v_v_turn + t45 * t16 + t46 * t36;
+    const float p_px_th_cruise = kf->modes.cruise.P[6];
+    const float p_px_th_speed = kf->modes.speed.P[6];
+    const float p_px_th_turn = kf->modes.turn.P[6];
+    const float p_px_th_next_cruise = w_cruise_cruise * p_px_th_cruise
+        + w_speed_cruise * p_px_th_speed + w_turn_cruise * p_px_th_turn + t41 * t26 + t42 * t37;
+    const float p_py_th_cruise = kf->modes.cruise.P[7];
+    const float p_py_th_speed = kf->modes.speed.P[7];
+    const float p_py_th_turn = kf->modes.turn.P[7];
+    const float p_py_th_next_cruise = w_cruise_cruise * p_py_th_cruise
+        + w_speed_cruise * p_py_th_speed + w_turn_cruise * p_py_th_turn + t43 * t26 + t44 * t37;
+    const float p_v_th_cruise = kf->modes.cruise.P[8];
+    const float p_v_th_speed = kf->modes.speed.P[8];
+    const float p_v_th_turn = kf->modes.turn.P[8];
+    const float p_v_th_next_cruise = w_cruise_cruise * p_v_th_cruise + w_speed_cruise * p_v_th_speed
+        + w_turn_cruise * p_v_th_turn + t45 * t26 + t46 * t37;
     const float t47 = t26 * t27;
     const float t48 = t37 * t40;
-    const float p_th_th_cruise = w_cruise_cruise * kf->modes.cruise.P[9]
-        + w_speed_cruise * kf->modes.speed.P[9] + w_turn_cruise * kf->modes.turn.P[9] + t47 * t26
-        + t48 * t37;
-    const float p_px_a_cruise = w_cruise_cruise * kf->modes.cruise.P[10]
-        + w_speed_cruise * kf->modes.speed.P[10] + w_turn_cruise * kf->modes.turn.P[10] + t41 * t17
-        + t42 * t38;
-    const float p_py_a_cruise = w_cruise_cruise * kf->modes.cruise.P[11]
-        + w_speed_cruise * kf->modes.speed.P[11] + w_turn_cruise * kf->modes.turn.P[11] + t43 * t17
-        + t44 * t38;
-    const float p_v_a_cruise = w_cruise_cruise * kf->modes.cruise.P[12]
-        + w_speed_cruise * kf->modes.speed.P[12] + w_turn_cruise * kf->modes.turn.P[12] + t45 * t17
-        + t46 * t38;
-    const float p_th_a_cruise = w_cruise_cruise * kf->modes.cruise.P[13]
-        + w_speed_cruise * kf->modes.speed.P[13] + w_turn_cruise * kf->modes.turn.P[13] + t47 * t17
-        + t48 * t38;
+    const float p_th_th_cruise = kf->modes.cruise.P[9];
+    const float p_th_th_speed = kf->modes.speed.P[9];
+    const float p_th_th_turn = kf->modes.turn.P[9];
+    const float p_th_th_next_cruise = w_cruise_cruise * p_th_th_cruise
+        + w_speed_cruise * p_th_th_speed + w_turn_cruise * p_th_th_turn + t47 * t26 + t48 * t37;
+    const float p_px_a_cruise = kf->modes.cruise.P[10];
+    const float p_px_a_speed = kf->modes.speed.P[10];
+    const float p_px_a_turn = kf->modes.turn.P[10];
+    const float p_px_a_next_cruise = w_cruise_cruise * p_px_a_cruise + w_speed_cruise * p_px_a_speed
+        + w_turn_cruise * p_px_a_turn + t41 * t17 + t42 * t38;
+    const float p_py_a_cruise = kf->modes.cruise.P[11];
+    const float p_py_a_speed = kf->modes.speed.P[11];
+    const float p_py_a_turn = kf->modes.turn.P[11];
+    const float p_py_a_next_cruise = w_cruise_cruise * p_py_a_cruise + w_speed_cruise * p_py_a_speed
+        + w_turn_cruise * p_py_a_turn + t43 * t17 + t44 * t38;
+    const float p_v_a_cruise = kf->modes.cruise.P[12];
+    const float p_v_a_speed = kf->modes.speed.P[12];
+    const float p_v_a_turn = kf->modes.turn.P[12];
+    const float p_v_a_next_cruise = w_cruise_cruise * p_v_a_cruise + w_speed_cruise * p_v_a_speed
+        + w_turn_cruise * p_v_a_turn + t45 * t17 + t46 * t38;
+    const float p_th_a_cruise = kf->modes.cruise.P[13];
+    const float p_th_a_speed = kf->modes.speed.P[13];
+    const float p_th_a_turn = kf->modes.turn.P[13];
+    const float p_th_a_next_cruise = w_cruise_cruise * p_th_a_cruise + w_speed_cruise * p_th_a_speed
+        + w_turn_cruise * p_th_a_turn + t47 * t17 + t48 * t38;
     const float t49 = t17 * t27;
     const float t50 = t38 * t40;
-    const float p_a_a_cruise = w_cruise_cruise * kf->modes.cruise.P[14]
-        + w_speed_cruise * kf->modes.speed.P[14] + w_turn_cruise * kf->modes.turn.P[14] + t49 * t17
-        + t50 * t38;
-    const float p_px_w_cruise = w_cruise_cruise * kf->modes.cruise.P[15]
-        + w_speed_cruise * kf->modes.speed.P[15] + w_turn_cruise * kf->modes.turn.P[15] + t41 * t18
-        + t42 * t39;
-    const float p_py_w_cruise = w_cruise_cruise * kf->modes.cruise.P[16]
-        + w_speed_cruise * kf->modes.speed.P[16] + w_turn_cruise * kf->modes.turn.P[16] + t43 * t18
-        + t44 * t39;
-    const float p_v_w_cruise = w_cruise_cruise * kf->modes.cruise.P[17]
-        + w_speed_cruise * kf->modes.speed.P[17] + w_turn_cruise * kf->modes.turn.P[17] + t45 * t18
-        + t46 * t39;
-    const float p_th_w_cruise = w_cruise_cruise * kf->modes.cruise.P[18]
-        + w_speed_cruise * kf->modes.speed.P[18] + w_turn_cruise * kf->modes.turn.P[18] + t47 * t18
-        + t48 * t39;
-    const float p_a_w_cruise = w_cruise_cruise * kf->modes.cruise.P[19]
-        + w_speed_cruise * kf->modes.speed.P[19] + w_turn_cruise * kf->modes.turn.P[19] + t49 * t18
-        + t50 * t39;
-    const float p_w_w_cruise = w_cruise_cruise * kf->modes.cruise.P[20]
-        + w_speed_cruise * kf->modes.speed.P[20] + w_turn_cruise * kf->modes.turn.P[20]
-        + t18 * t27 * t18 + t39 * t40 * t39;
+    const float p_a_a_cruise = kf->modes.cruise.P[14];
+    const float p_a_a_speed = kf->modes.speed.P[14];
+    const float p_a_a_turn = kf->modes.turn.P[14];
+    const float p_a_a_next_cruise = w_cruise_cruise * p_a_a_cruise + w_speed_cruise * p_a_a_speed
+        + w_turn_cruise * p_a_a_turn + t49 * t17 + t50 * t38;
+    const float p_px_w_cruise = kf->modes.cruise.P[15];
+    const float p_px_w_speed = kf->modes.speed.P[15];
+    const float p_px_w_turn = kf->modes.turn.P[15];
+    const float p_px_w_next_cruise = w_cruise_cruise * p_px_w_cruise + w_speed_cruise * p_px_w_speed
+        + w_turn_cruise * p_px_w_turn + t41 * t18 + t42 * t39;
+    const float p_py_w_cruise = kf->modes.cruise.P[16];
+    const float p_py_w_speed = kf->modes.speed.P[16];
+    const float p_py_w_turn = kf->modes.turn.P[16];
+    const float p_py_w_next_cruise = w_cruise_cruise * p_py_w_cruise + w_speed_cruise * p_py_w_speed
+        + w_turn_cruise * p_py_w_turn + t43 * t18 + t44 * t39;
+    const float p_v_w_cruise = kf->modes.cruise.P[17];
+    const float p_v_w_speed = kf->modes.speed.P[17];
+    const float p_v_w_turn = kf->modes.turn.P[17];
+    const float p_v_w_next_cruise = w_cruise_cruise * p_v_w_cruise + w_speed_cruise * p_v_w_speed
+        + w_turn_cruise * p_v_w_turn + t45 * t18 + t46 * t39;
+    const float p_th_w_cruise = kf->modes.cruise.P[18];
+    const float p_th_w_speed = kf->modes.speed.P[18];
+    const float p_th_w_turn = kf->modes.turn.P[18];
+    const float p_th_w_next_cruise = w_cruise_cruise * p_th_w_cruise + w_speed_cruise * p_th_w_speed
+        + w_turn_cruise * p_th_w_turn + t47 * t18 + t48 * t39;
+    const float p_a_w_cruise = kf->modes.cruise.P[19];
+    const float p_a_w_speed = kf->modes.speed.P[19];
+    const float p_a_w_turn = kf->modes.turn.P[19];
+    const float p_a_w_next_cruise = w_cruise_cruise * p_a_w_cruise + w_speed_cruise * p_a_w_speed
+        + w_turn_cruise * p_a_w_turn + t49 * t18 + t50 * t39;
+    const float p_w_w_cruise = kf->modes.cruise.P[20];
+    const float p_w_w_speed = kf->modes.speed.P[20];
+    const float p_w_w_turn = kf->modes.turn.P[20];
+    const float p_w_w_next_cruise = w_cruise_cruise * p_w_w_cruise + w_speed_cruise * p_w_w_speed
+        + w_turn_cruise * p_w_w_turn + t18 * t27 * t18 + t39 * t40 * t39;
 
     /* speed: where it starts from */
     const float th_base_speed = w_cruise_speed < w_speed_speed ? th_speed : th_cruise;
@@ -295,52 +337,52 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     const float w_speed_1 = w_speed - w_cruise_speed * t18;
     const float th_speed_1 = maneuver_wrap(th_base_speed + t51 + w_cruise_speed * t52, 3.1415927f);
     const float t54 = t14 * t53;
-    const float p_px_px_speed = w_cruise_speed * kf->modes.cruise.P[0]
-        + w_speed_speed * kf->modes.speed.P[0] + t54 * t14;
-    const float p_px_py_speed = w_cruise_speed * kf->modes.cruise.P[1]
-        + w_speed_speed * kf->modes.speed.P[1] + t54 * t15;
+    const float p_px_px_next_speed = w_cruise_speed * p_px_px_cruise + w_speed_speed * p_px_px_speed
+        + t54 * t14;
+    const float p_px_py_next_speed = w_cruise_speed * p_px_py_cruise + w_speed_speed * p_px_py_speed
+        + t54 * t15;
     const float t55 = t15 * t53;
-    const float p_py_py_speed = w_cruise_speed * kf->modes.cruise.P[2]
-        + w_speed_speed * kf->modes.speed.P[2] + t55 * t15;
-    const float p_px_v_speed = w_cruise_speed * kf->modes.cruise.P[3]
-        + w_speed_speed * kf->modes.speed.P[3] + t54 * t16;
-    const float p_py_v_speed = w_cruise_speed * kf->modes.cruise.P[4]
-        + w_speed_speed * kf->modes.speed.P[4] + t55 * t16;
+    const float p_py_py_next_speed = w_cruise_speed * p_py_py_cruise + w_speed_speed * p_py_py_speed
+        + t55 * t15;
+    const float p_px_v_next_speed = w_cruise_speed * p_px_v_cruise + w_speed_speed * p_px_v_speed
+        + t54 * t16;
+    const float p_py_v_next_speed = w_cruise_speed * p_py_v_cruise + w_speed_speed * p_py_v_speed
+        + t55 * t16;
     const float t56 = t16 * t53;
-    const float p_v_v_speed = w_cruise_speed * kf->modes.cruise.P[5]
-        + w_speed_speed * kf->modes.speed.P[5] + t56 * t16;
-    const float p_px_th_speed = w_cruise_speed * kf->modes.cruise.P[6]
-        + w_speed_speed * kf->modes.speed.P[6] - t54 * t52;
-    const float p_py_th_speed = w_cruise_speed * kf->modes.cruise.P[7]
-        + w_speed_speed * kf->modes.speed.P[7] - t55 * t52;
-    const float p_v_th_speed = w_cruise_speed * kf->modes.cruise.P[8]
-        + w_speed_speed * kf->modes.speed.P[8] - t56 * t52;
+    const float p_v_v_next_speed = w_cruise_speed * p_v_v_cruise + w_speed_speed * p_v_v_speed
+        + t56 * t16;
+    const float p_px_th_next_speed = w_cruise_speed * p_px_th_cruise + w_speed_speed * p_px_th_speed
+        - t54 * t52;
+    const float p_py_th_next_speed = w_cruise_speed * p_py_th_cruise + w_speed_speed * p_py_th_speed
+        - t55 * t52;
+    const float p_v_th_next_speed = w_cruise_speed * p_v_th_cruise + w_speed_speed * p_v_th_speed
+        - t56 * t52;
     const float t57 = t52 * t53;
-    const float p_th_th_speed = w_cruise_speed * kf->modes.cruise.P[9]
-        + w_speed_speed * kf->modes.speed.P[9] + t57 * t52;
-    const float p_px_a_speed = w_cruise_speed * kf->modes.cruise.P[10]
-        + w_speed_speed * kf->modes.speed.P[10] + t54 * t17;
-    const float p_py_a_speed = w_cruise_speed * kf->modes.cruise.P[11]
-        + w_speed_speed * kf->modes.speed.P[11] + t55 * t17;
-    const float p_v_a_speed = w_cruise_speed * kf->modes.cruise.P[12]
-        + w_speed_speed * kf->modes.speed.P[12] + t56 * t17;
-    const float p_th_a_speed = w_cruise_speed * kf->modes.cruise.P[13]
-        + w_speed_speed * kf->modes.speed.P[13] - t57 * t17;
+    const float p_th_th_next_speed = w_cruise_speed * p_th_th_cruise + w_speed_speed * p_th_th_speed
+        + t57 * t52;
+    const float p_px_a_next_speed = w_cruise_speed * p_px_a_cruise + w_speed_speed * p_px_a_speed
+        + t54 * t17;
+    const float p_py_a_next_speed = w_cruise_speed * p_py_a_cruise + w_speed_speed * p_py_a_speed
+        + t55 * t17;
+    const float p_v_a_next_speed = w_cruise_speed * p_v_a_cruise + w_speed_speed * p_v_a_speed
+        + t56 * t17;
+    const float p_th_a_next_speed = w_cruise_speed * p_th_a_cruise + w_speed_speed * p_th_a_speed
+        - t57 * t17;
     const float t58 = t17 * t53;
-    const float p_a_a_speed = w_cruise_speed * kf->modes.cruise.P[14]
-        + w_speed_speed * kf->modes.speed.P[14] + t58 * t17;
-    const float p_px_w_speed = w_cruise_speed * kf->modes.cruise.P[15]
-        + w_speed_speed * kf->modes.speed.P[15] + t54 * t18;
-    const float p_py_w_speed = w_cruise_speed * kf->modes.cruise.P[16]
-        + w_speed_speed * kf->modes.speed.P[16] + t55 * t18;
-    const float p_v_w_speed = w_cruise_speed * kf->modes.cruise.P[17]
-        + w_speed_speed * kf->modes.speed.P[17] + t56 * t18;
-    const float p_th_w_speed = w_cruise_speed * kf->modes.cruise.P[18]
-        + w_speed_speed * kf->modes.speed.P[18] - t57 * t18;
-    const float p_a_w_speed = w_cruise_speed * kf->modes.cruise.P[19]
-        + w_speed_speed * kf->modes.speed.P[19] + t58 * t18;
-    const float p_w_w_speed = w_cruise_speed * kf->modes.cruise.P[20]
-        + w_speed_speed * kf->modes.speed.P[20] + t18 * t53 * t18;
+    const float p_a_a_next_speed = w_cruise_speed * p_a_a_cruise + w_speed_speed * p_a_a_speed
+        + t58 * t17;
+    const float p_px_w_next_speed = w_cruise_speed * p_px_w_cruise + w_speed_speed * p_px_w_speed
+        + t54 * t18;
+    const float p_py_w_next_speed = w_cruise_speed * p_py_w_cruise + w_speed_speed * p_py_w_speed
+        + t55 * t18;
+    const float p_v_w_next_speed = w_cruise_speed * p_v_w_cruise + w_speed_speed * p_v_w_speed
+        + t56 * t18;
+    const float p_th_w_next_speed = w_cruise_speed * p_th_w_cruise + w_speed_speed * p_th_w_speed
+        - t57 * t18;
+    const float p_a_w_next_speed = w_cruise_speed * p_a_w_cruise + w_speed_speed * p_a_w_speed
+        + t58 * t18;
+    const float p_w_w_next_speed = w_cruise_speed * p_w_w_cruise + w_speed_speed * p_w_w_speed
+        + t18 * t53 * t18;
 
     /* turn: where it starts from */
     const float th_base_turn = w_cruise_turn < w_turn_turn ? th_turn : th_cruise;
@@ -354,52 +396,52 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     const float w_turn_1 = w_turn - w_cruise_turn * t23;
     const float th_turn_1 = maneuver_wrap(th_base_turn + t59 + w_cruise_turn * t60, 3.1415927f);
     const float t62 = t19 * t61;
-    const float p_px_px_turn = w_cruise_turn * kf->modes.cruise.P[0]
-        + w_turn_turn * kf->modes.turn.P[0] + t62 * t19;
-    const float p_px_py_turn = w_cruise_turn * kf->modes.cruise.P[1]
-        + w_turn_turn * kf->modes.turn.P[1] + t62 * t20;
+    const float p_px_px_next_turn = w_cruise_turn * p_px_px_cruise + w_turn_turn * p_px_px_turn
+        + t62 * t19;
+    const float p_px_py_next_turn = w_cruise_turn * p_px_py_cruise + w_turn_turn * p_px_py_turn
+        + t62 * t20;
     const float t63 = t20 * t61;
-    const float p_py_py_turn = w_cruise_turn * kf->modes.cruise.P[2]
-        + w_turn_turn * kf->modes.turn.P[2] + t63 * t20;
-    const float p_px_v_turn = w_cruise_turn * kf->modes.cruise.P[3]
-        + w_turn_turn * kf->modes.turn.P[3] + t62 * t21;
-    const float p_py_v_turn = w_cruise_turn * kf->modes.cruise.P[4]
-        + w_turn_turn * kf->modes.turn.P[4] + t63 * t21;
+    const float p_py_py_next_turn = w_cruise_turn * p_py_py_cruise + w_turn_turn * p_py_py_turn
+        + t63 * t20;
+    const float p_px_v_next_turn = w_cruise_turn * p_px_v_cruise + w_turn_turn * p_px_v_turn
+        + t62 * t21;
+    const float p_py_v_next_turn = w_cruise_turn * p_py_v_cruise + w_turn_turn * p_py_v_turn
+        + t63 * t21;
     const float t64 = t21 * t61;
-    const float p_v_v_turn = w_cruise_turn * kf->modes.cruise.P[5]
-        + w_turn_turn * kf->modes.turn.P[5] + t64 * t21;
-    const float p_px_th_turn = w_cruise_turn * kf->modes.cruise.P[6]
-        + w_turn_turn * kf->modes.turn.P[6] - t62 * t60;
-    const float p_py_th_turn = w_cruise_turn * kf->modes.cruise.P[7]
-        + w_turn_turn * kf->modes.turn.P[7] - t63 * t60;
-    const float p_v_th_turn = w_cruise_turn * kf->modes.cruise.P[8]
-        + w_turn_turn * kf->modes.turn.P[8] - t64 * t60;
+    const float p_v_v_next_turn = w_cruise_turn * p_v_v_cruise + w_turn_turn * p_v_v_turn
+        + t64 * t21;
+    const float p_px_th_next_turn = w_cruise_turn * p_px_th_cruise + w_turn_turn * p_px_th_turn
+        - t62 * t60;
+    const float p_py_th_next_turn = w_cruise_turn * p_py_th_cruise + w_turn_turn * p_py_th_turn
+        - t63 * t60;
+    const float p_v_th_next_turn = w_cruise_turn * p_v_th_cruise + w_turn_turn * p_v_th_turn
+        - t64 * t60;
     const float t65 = t60 * t61;
-    const float p_th_th_turn = w_cruise_turn * kf->modes.cruise.P[9]
-        + w_turn_turn * kf->modes.turn.P[9] + t65 * t60;
-    const float p_px_a_turn = w_cruise_turn * kf->modes.cruise.P[10]
-        + w_turn_turn * kf->modes.turn.P[10] + t62 * t22;
-    const float p_py_a_turn = w_cruise_turn * kf->modes.cruise.P[11]
-        + w_turn_turn * kf->modes.turn.P[11] + t63 * t22;
-    const float p_v_a_turn = w_cruise_turn * kf->modes.cruise.P[12]
-        + w_turn_turn * kf->modes.turn.P[12] + t64 * t22;
-    const float p_th_a_turn = w_cruise_turn * kf->modes.cruise.P[13]
-        + w_turn_turn * kf->modes.turn.P[13] - t65 * t22;
+    const float p_th_th_next_turn = w_cruise_turn * p_th_th_cruise + w_turn_turn * p_th_th_turn
+        + t65 * t60;
+    const float p_px_a_next_turn = w_cruise_turn * p_px_a_cruise + w_turn_turn * p_px_a_turn
+        + t62 * t22;
+    const float p_py_a_next_turn = w_cruise_turn * p_py_a_cruise + w_turn_turn * p_py_a_turn
+        + t63 * t22;
+    const float p_v_a_next_turn = w_cruise_turn * p_v_a_cruise + w_turn_turn * p_v_a_turn
+        + t64 * t22;
+    const float p_th_a_next_turn = w_cruise_turn * p_th_a_cruise + w_turn_turn * p_th_a_turn
+        - t65 * t22;
     const float t66 = t22 * t61;
-    const float p_a_a_turn = w_cruise_turn * kf->modes.cruise.P[14]
-        + w_turn_turn * kf->modes.turn.P[14] + t66 * t22;
-    const float p_px_w_turn = w_cruise_turn * kf->modes.cruise.P[15]
-        + w_turn_turn * kf->modes.turn.P[15] + t62 * t23;
-    const float p_py_w_turn = w_cruise_turn * kf->modes.cruise.P[16]
-        + w_turn_turn * kf->modes.turn.P[16] + t63 * t23;
-    const float p_v_w_turn = w_cruise_turn * kf->modes.cruise.P[17]
-        + w_turn_turn * kf->modes.turn.P[17] + t64 * t23;
-    const float p_th_w_turn = w_cruise_turn * kf->modes.cruise.P[18]
-        + w_turn_turn * kf->modes.turn.P[18] - t65 * t23;
-    const float p_a_w_turn = w_cruise_turn * kf->modes.cruise.P[19]
-        + w_turn_turn * kf->modes.turn.P[19] + t66 * t23;
-    const float p_w_w_turn = w_cruise_turn * kf->modes.cruise.P[20]
-        + w_turn_turn * kf->modes.turn.P[20] + t23 * t61 * t23;
+    const float p_a_a_next_turn = w_cruise_turn * p_a_a_cruise + w_turn_turn * p_a_a_turn
+        + t66 * t22;
+    const float p_px_w_next_turn = w_cruise_turn * p_px_w_cruise + w_turn_turn * p_px_w_turn
+        + t62 * t23;
+    const float p_py_w_next_turn = w_cruise_turn * p_py_w_cruise + w_turn_turn * p_py_w_turn
+        + t63 * t23;
+    const float p_v_w_next_turn = w_cruise_turn * p_v_w_cruise + w_turn_turn * p_v_w_turn
+        + t64 * t23;
+    const float p_th_w_next_turn = w_cruise_turn * p_th_w_cruise + w_turn_turn * p_th_w_turn
+        - t65 * t23;
+    const float p_a_w_next_turn = w_cruise_turn * p_a_w_cruise + w_turn_turn * p_a_w_turn
+        + t66 * t23;
+    const float p_w_w_next_turn = w_cruise_turn * p_w_w_cruise + w_turn_turn * p_w_w_turn
+        + t23 * t61 * t23;
 
     /* cruise: model */
     const float cos_th_cruise = cosf(th_cruise_1);
@@ -412,28 +454,29 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     const float w_next_cruise = 0.5f * w_cruise_1;
 
     /* cruise: P = F P F^T + Q: the diagonal first, for the guards */
-    const float p_px_v_cruise_1 = p_px_v_cruise + p_v_v_cruise * cos_th_cruise
-        - p_v_th_cruise * t67;
-    const float p_px_th_cruise_1 = p_px_th_cruise + p_v_th_cruise * cos_th_cruise
-        - p_th_th_cruise * t67;
-    const float p_px_px_cruise_1 = p_px_px_cruise + p_px_v_cruise * cos_th_cruise
-        - p_px_th_cruise * t67 + p_px_v_cruise_1 * cos_th_cruise - p_px_th_cruise_1 * t67 + 1.0f;
-    const float p_py_v_cruise_1 = p_py_v_cruise + p_v_v_cruise * sin_th_cruise
-        + p_v_th_cruise * f_py_th_cruise;
-    const float p_py_th_cruise_1 = p_py_th_cruise + p_v_th_cruise * sin_th_cruise
-        + p_th_th_cruise * f_py_th_cruise;
-    const float p_py_py_cruise_1 = p_py_py_cruise + p_py_v_cruise * sin_th_cruise
-        + p_py_th_cruise * f_py_th_cruise + p_py_v_cruise_1 * sin_th_cruise
-        + p_py_th_cruise_1 * f_py_th_cruise + 1.0f;
-    const float p_v_v_cruise_1 = p_v_v_cruise + 0.1f;
-    const float p_th_th_cruise_1 = p_th_th_cruise + 0.00001f;
-    const float p_a_a_cruise_1 = 0.25f * p_a_a_cruise + 0.1f;
-    const float p_w_w_cruise_1 = 0.25f * p_w_w_cruise + 0.0001f;
+    const float p_px_v_next_cruise_1 = p_px_v_next_cruise + p_v_v_next_cruise * cos_th_cruise
+        - p_v_th_next_cruise * t67;
+    const float p_px_th_next_cruise_1 = p_px_th_next_cruise + p_v_th_next_cruise * cos_th_cruise
+        - p_th_th_next_cruise * t67;
+    const float p_px_px_next_cruise_1 = p_px_px_next_cruise + p_px_v_next_cruise * cos_th_cruise
+        - p_px_th_next_cruise * t67 + p_px_v_next_cruise_1 * cos_th_cruise
+        - p_px_th_next_cruise_1 * t67 + 1.0f;
+    const float p_py_v_next_cruise_1 = p_py_v_next_cruise + p_v_v_next_cruise * sin_th_cruise
+        + p_v_th_next_cruise * f_py_th_cruise;
+    const float p_py_th_next_cruise_1 = p_py_th_next_cruise + p_v_th_next_cruise * sin_th_cruise
+        + p_th_th_next_cruise * f_py_th_cruise;
+    const float p_py_py_next_cruise_1 = p_py_py_next_cruise + p_py_v_next_cruise * sin_th_cruise
+        + p_py_th_next_cruise * f_py_th_cruise + p_py_v_next_cruise_1 * sin_th_cruise
+        + p_py_th_next_cruise_1 * f_py_th_cruise + 1.0f;
+    const float p_v_v_next_cruise_1 = p_v_v_next_cruise + 0.1f;
+    const float p_th_th_next_cruise_1 = p_th_th_next_cruise + 0.00001f;
+    const float p_a_a_next_cruise_1 = 0.25f * p_a_a_next_cruise + 0.1f;
+    const float p_w_w_next_cruise_1 = 0.25f * p_w_w_next_cruise + 0.0001f;
 
     /* cruise: guards */
     if (!maneuver_finite(px_next_cruise + py_next_cruise + a_next_cruise + w_next_cruise
-        + p_px_px_cruise_1 + p_py_py_cruise_1 + p_v_v_cruise_1 + p_th_th_cruise_1 + p_a_a_cruise_1
-        + p_w_w_cruise_1)) {
+        + p_px_px_next_cruise_1 + p_py_py_next_cruise_1 + p_v_v_next_cruise_1
+        + p_th_th_next_cruise_1 + p_a_a_next_cruise_1 + p_w_w_next_cruise_1)) {
         return MANEUVER_NOT_FINITE;
     }
 
@@ -451,34 +494,35 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     const float w_next_speed = 0.5f * w_speed_1;
 
     /* speed: P = F P F^T + Q: the diagonal first, for the guards */
-    const float t70 = p_px_v_speed + p_v_v_speed * cos_th_speed - p_v_th_speed * t69
-        + p_v_a_speed * f_px_a_speed;
-    const float p_px_th_speed_1 = p_px_th_speed + p_v_th_speed * cos_th_speed - p_th_th_speed * t69
-        + p_th_a_speed * f_px_a_speed;
-    const float p_px_a_speed_1 = p_px_a_speed + p_v_a_speed * cos_th_speed - p_th_a_speed * t69
-        + p_a_a_speed * f_px_a_speed;
-    const float p_px_px_speed_1 = p_px_px_speed + p_px_v_speed * cos_th_speed - p_px_th_speed * t69
-        + p_px_a_speed * f_px_a_speed + t70 * cos_th_speed - p_px_th_speed_1 * t69
-        + p_px_a_speed_1 * f_px_a_speed + 1.0f;
-    const float t71 = p_py_v_speed + p_v_v_speed * sin_th_speed + p_v_th_speed * f_py_th_speed
-        + p_v_a_speed * f_py_a_speed;
-    const float p_py_th_speed_1 = p_py_th_speed + p_v_th_speed * sin_th_speed
-        + p_th_th_speed * f_py_th_speed + p_th_a_speed * f_py_a_speed;
-    const float p_py_a_speed_1 = p_py_a_speed + p_v_a_speed * sin_th_speed
-        + p_th_a_speed * f_py_th_speed + p_a_a_speed * f_py_a_speed;
-    const float p_py_py_speed_1 = p_py_py_speed + p_py_v_speed * sin_th_speed
-        + p_py_th_speed * f_py_th_speed + p_py_a_speed * f_py_a_speed + t71 * sin_th_speed
-        + p_py_th_speed_1 * f_py_th_speed + p_py_a_speed_1 * f_py_a_speed + 1.0f;
-    const float p_v_a_speed_1 = p_v_a_speed + p_a_a_speed;
-    const float p_v_v_speed_1 = p_v_v_speed + p_v_a_speed + p_v_a_speed_1 + 0.1f;
-    const float p_th_th_speed_1 = p_th_th_speed + 0.00001f;
-    const float p_a_a_speed_1 = p_a_a_speed + 0.5f;
-    const float p_w_w_speed_1 = 0.25f * p_w_w_speed + 0.0001f;
+    const float t70 = p_px_v_next_speed + p_v_v_next_speed * cos_th_speed - p_v_th_next_speed * t69
+        + p_v_a_next_speed * f_px_a_speed;
+    const float p_px_th_next_speed_1 = p_px_th_next_speed + p_v_th_next_speed * cos_th_speed
+        - p_th_th_next_speed * t69 + p_th_a_next_speed * f_px_a_speed;
+    const float p_px_a_next_speed_1 = p_px_a_next_speed + p_v_a_next_speed * cos_th_speed
+        - p_th_a_next_speed * t69 + p_a_a_next_speed * f_px_a_speed;
+    const float p_px_px_next_speed_1 = p_px_px_next_speed + p_px_v_next_speed * cos_th_speed
+        - p_px_th_next_speed * t69 + p_px_a_next_speed * f_px_a_speed + t70 * cos_th_speed
+        - p_px_th_next_speed_1 * t69 + p_px_a_next_speed_1 * f_px_a_speed + 1.0f;
+    const float t71 = p_py_v_next_speed + p_v_v_next_speed * sin_th_speed
+        + p_v_th_next_speed * f_py_th_speed + p_v_a_next_speed * f_py_a_speed;
+    const float p_py_th_next_speed_1 = p_py_th_next_speed + p_v_th_next_speed * sin_th_speed
+        + p_th_th_next_speed * f_py_th_speed + p_th_a_next_speed * f_py_a_speed;
+    const float p_py_a_next_speed_1 = p_py_a_next_speed + p_v_a_next_speed * sin_th_speed
+        + p_th_a_next_speed * f_py_th_speed + p_a_a_next_speed * f_py_a_speed;
+    const float p_py_py_next_speed_1 = p_py_py_next_speed + p_py_v_next_speed * sin_th_speed
+        + p_py_th_next_speed * f_py_th_speed + p_py_a_next_speed * f_py_a_speed + t71 * sin_th_speed
+        + p_py_th_next_speed_1 * f_py_th_speed + p_py_a_next_speed_1 * f_py_a_speed + 1.0f;
+    const float p_v_a_next_speed_1 = p_v_a_next_speed + p_a_a_next_speed;
+    const float p_v_v_next_speed_1 = p_v_v_next_speed + p_v_a_next_speed + p_v_a_next_speed_1
+        + 0.1f;
+    const float p_th_th_next_speed_1 = p_th_th_next_speed + 0.00001f;
+    const float p_a_a_next_speed_1 = p_a_a_next_speed + 0.5f;
+    const float p_w_w_next_speed_1 = 0.25f * p_w_w_next_speed + 0.0001f;
 
     /* speed: guards */
     if (!maneuver_finite(px_next_speed + py_next_speed + v_next_speed + w_next_speed
-        + p_px_px_speed_1 + p_py_py_speed_1 + p_v_v_speed_1 + p_th_th_speed_1 + p_a_a_speed_1
-        + p_w_w_speed_1)) {
+        + p_px_px_next_speed_1 + p_py_py_next_speed_1 + p_v_v_next_speed_1 + p_th_th_next_speed_1
+        + p_a_a_next_speed_1 + p_w_w_next_speed_1)) {
         return MANEUVER_NOT_FINITE;
     }
 
@@ -496,33 +540,37 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     const float a_next_turn = 0.5f * a_turn_1;
 
     /* turn: P = F P F^T + Q: the diagonal first, for the guards */
-    const float p_px_v_turn_1 = p_px_v_turn + p_v_v_turn * f_px_v_turn - p_v_th_turn * t73
-        - p_v_w_turn * t74;
-    const float t75 = p_px_th_turn + p_v_th_turn * f_px_v_turn - p_th_th_turn * t73
-        - p_th_w_turn * t74;
-    const float p_px_w_turn_1 = p_px_w_turn + p_v_w_turn * f_px_v_turn - p_th_w_turn * t73
-        - p_w_w_turn * t74;
-    const float p_px_px_turn_1 = p_px_px_turn + p_px_v_turn * f_px_v_turn - p_px_th_turn * t73
-        - p_px_w_turn * t74 + p_px_v_turn_1 * f_px_v_turn - t75 * t73 - p_px_w_turn_1 * t74 + 1.0f;
-    const float p_py_v_turn_1 = p_py_v_turn + p_v_v_turn * f_py_v_turn + p_v_th_turn * f_py_th_turn
-        + p_v_w_turn * f_py_w_turn;
-    const float t76 = p_py_th_turn + p_v_th_turn * f_py_v_turn + p_th_th_turn * f_py_th_turn
-        + p_th_w_turn * f_py_w_turn;
-    const float p_py_w_turn_1 = p_py_w_turn + p_v_w_turn * f_py_v_turn + p_th_w_turn * f_py_th_turn
-        + p_w_w_turn * f_py_w_turn;
-    const float p_py_py_turn_1 = p_py_py_turn + p_py_v_turn * f_py_v_turn
-        + p_py_th_turn * f_py_th_turn + p_py_w_turn * f_py_w_turn + p_py_v_turn_1 * f_py_v_turn
-        + t76 * f_py_th_turn + p_py_w_turn_1 * f_py_w_turn + 1.0f;
-    const float p_v_v_turn_1 = p_v_v_turn + 0.1f;
-    const float p_th_w_turn_1 = p_th_w_turn + p_w_w_turn;
-    const float p_th_th_turn_1 = p_th_th_turn + p_th_w_turn + p_th_w_turn_1 + 0.00001f;
-    const float p_a_a_turn_1 = 0.25f * p_a_a_turn + 0.1f;
-    const float p_w_w_turn_1 = p_w_w_turn + 0.001f;
+    const float p_px_v_next_turn_1 = p_px_v_next_turn + p_v_v_next_turn * f_px_v_turn
+        - p_v_th_next_turn * t73 - p_v_w_next_turn * t74;
+    const float t75 = p_px_th_next_turn + p_v_th_next_turn * f_px_v_turn - p_th_th_next_turn * t73
+        - p_th_w_next_turn * t74;
+    const float p_px_w_next_turn_1 = p_px_w_next_turn + p_v_w_next_turn * f_px_v_turn
+        - p_th_w_next_turn * t73 - p_w_w_next_turn * t74;
+    const float p_px_px_next_turn_1 = p_px_px_next_turn + p_px_v_next_turn * f_px_v_turn
+        - p_px_th_next_turn * t73 - p_px_w_next_turn * t74 + p_px_v_next_turn_1 * f_px_v_turn
+        - t75 * t73 - p_px_w_next_turn_1 * t74 + 1.0f;
+    const float p_py_v_next_turn_1 = p_py_v_next_turn + p_v_v_next_turn * f_py_v_turn
+        + p_v_th_next_turn * f_py_th_turn + p_v_w_next_turn * f_py_w_turn;
+    const float t76 = p_py_th_next_turn + p_v_th_next_turn * f_py_v_turn
+        + p_th_th_next_turn * f_py_th_turn + p_th_w_next_turn * f_py_w_turn;
+    const float p_py_w_next_turn_1 = p_py_w_next_turn + p_v_w_next_turn * f_py_v_turn
+        + p_th_w_next_turn * f_py_th_turn + p_w_w_next_turn * f_py_w_turn;
+    const float p_py_py_next_turn_1 = p_py_py_next_turn + p_py_v_next_turn * f_py_v_turn
+        + p_py_th_next_turn * f_py_th_turn + p_py_w_next_turn * f_py_w_turn
+        + p_py_v_next_turn_1 * f_py_v_turn + t76 * f_py_th_turn + p_py_w_next_turn_1 * f_py_w_turn
+        + 1.0f;
+    const float p_v_v_next_turn_1 = p_v_v_next_turn + 0.1f;
+    const float p_th_w_next_turn_1 = p_th_w_next_turn + p_w_w_next_turn;
+    const float p_th_th_next_turn_1 = p_th_th_next_turn + p_th_w_next_turn + p_th_w_next_turn_1
+        + 0.00001f;
+    const float p_a_a_next_turn_1 = 0.25f * p_a_a_next_turn + 0.1f;
+    const float p_w_w_next_turn_1 = p_w_w_next_turn + 0.001f;
     const float t77 = maneuver_wrap(th_next_turn, 3.1415927f);
 
     /* turn: guards */
-    if (!maneuver_finite(px_next_turn + py_next_turn + t77 + a_next_turn + p_px_px_turn_1
-        + p_py_py_turn_1 + p_v_v_turn_1 + p_th_th_turn_1 + p_a_a_turn_1 + p_w_w_turn_1)) {
+    if (!maneuver_finite(px_next_turn + py_next_turn + t77 + a_next_turn + p_px_px_next_turn_1
+        + p_py_py_next_turn_1 + p_v_v_next_turn_1 + p_th_th_next_turn_1 + p_a_a_next_turn_1
+        + p_w_w_next_turn_1)) {
         return MANEUVER_NOT_FINITE;
     }
     const float t78 = 1.0f / (c_cruise + c_speed + c_turn);
@@ -564,43 +612,45 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.cruise.x[MANEUVER_TH] = th_cruise_1;
     kf->modes.cruise.x[MANEUVER_A] = a_next_cruise;
     kf->modes.cruise.x[MANEUVER_W] = w_next_cruise;
-    kf->modes.cruise.P[0] = p_px_px_cruise_1;
-    const float p_px_py_cruise_1 = p_px_py_cruise + p_px_v_cruise * sin_th_cruise
-        + p_px_th_cruise * f_py_th_cruise + p_py_v_cruise_1 * cos_th_cruise
-        - p_py_th_cruise_1 * t67;
-    kf->modes.cruise.P[1] = p_px_py_cruise_1;
-    kf->modes.cruise.P[2] = p_py_py_cruise_1;
-    kf->modes.cruise.P[3] = p_px_v_cruise_1;
-    kf->modes.cruise.P[4] = p_py_v_cruise_1;
-    kf->modes.cruise.P[5] = p_v_v_cruise_1;
-    kf->modes.cruise.P[6] = p_px_th_cruise_1;
-    kf->modes.cruise.P[7] = p_py_th_cruise_1;
-    kf->modes.cruise.P[8] = p_v_th_cruise;
-    kf->modes.cruise.P[9] = p_th_th_cruise_1;
-    const float p_px_a_cruise_1 = 0.5f
-        * (p_px_a_cruise + p_v_a_cruise * cos_th_cruise - p_th_a_cruise * t67);
-    kf->modes.cruise.P[10] = p_px_a_cruise_1;
-    const float p_py_a_cruise_1 = 0.5f
-        * (p_py_a_cruise + p_v_a_cruise * sin_th_cruise + p_th_a_cruise * f_py_th_cruise);
-    kf->modes.cruise.P[11] = p_py_a_cruise_1;
-    const float p_v_a_cruise_1 = 0.5f * p_v_a_cruise;
-    kf->modes.cruise.P[12] = p_v_a_cruise_1;
-    const float p_th_a_cruise_1 = 0.5f * p_th_a_cruise;
-    kf->modes.cruise.P[13] = p_th_a_cruise_1;
-    kf->modes.cruise.P[14] = p_a_a_cruise_1;
-    const float p_px_w_cruise_1 = 0.5f
-        * (p_px_w_cruise + p_v_w_cruise * cos_th_cruise - p_th_w_cruise * t67);
-    kf->modes.cruise.P[15] = p_px_w_cruise_1;
-    const float p_py_w_cruise_1 = 0.5f
-        * (p_py_w_cruise + p_v_w_cruise * sin_th_cruise + p_th_w_cruise * f_py_th_cruise);
-    kf->modes.cruise.P[16] = p_py_w_cruise_1;
-    const float p_v_w_cruise_1 = 0.5f * p_v_w_cruise;
-    kf->modes.cruise.P[17] = p_v_w_cruise_1;
-    const float p_th_w_cruise_1 = 0.5f * p_th_w_cruise;
-    kf->modes.cruise.P[18] = p_th_w_cruise_1;
-    const float p_a_w_cruise_1 = 0.25f * p_a_w_cruise;
-    kf->modes.cruise.P[19] = p_a_w_cruise_1;
-    kf->modes.cruise.P[20] = p_w_w_cruise_1;
+    kf->modes.cruise.P[0] = p_px_px_next_cruise_1;
+    const float p_px_py_next_cruise_1 = p_px_py_next_cruise + p_px_v_next_cruise * sin_th_cruise
+        + p_px_th_next_cruise * f_py_th_cruise + p_py_v_next_cruise_1 * cos_th_cruise
+        - p_py_th_next_cruise_1 * t67;
+    kf->modes.cruise.P[1] = p_px_py_next_cruise_1;
+    kf->modes.cruise.P[2] = p_py_py_next_cruise_1;
+    kf->modes.cruise.P[3] = p_px_v_next_cruise_1;
+    kf->modes.cruise.P[4] = p_py_v_next_cruise_1;
+    kf->modes.cruise.P[5] = p_v_v_next_cruise_1;
+    kf->modes.cruise.P[6] = p_px_th_next_cruise_1;
+    kf->modes.cruise.P[7] = p_py_th_next_cruise_1;
+    kf->modes.cruise.P[8] = p_v_th_next_cruise;
+    kf->modes.cruise.P[9] = p_th_th_next_cruise_1;
+    const float p_px_a_next_cruise_1 =
+        0.5f * (p_px_a_next_cruise + p_v_a_next_cruise * cos_th_cruise - p_th_a_next_cruise * t67);
+    kf->modes.cruise.P[10] = p_px_a_next_cruise_1;
+    const float p_py_a_next_cruise_1 =
+        0.5f * (p_py_a_next_cruise + p_v_a_next_cruise * sin_th_cruise
+        + p_th_a_next_cruise * f_py_th_cruise);
+    kf->modes.cruise.P[11] = p_py_a_next_cruise_1;
+    const float p_v_a_next_cruise_1 = 0.5f * p_v_a_next_cruise;
+    kf->modes.cruise.P[12] = p_v_a_next_cruise_1;
+    const float p_th_a_next_cruise_1 = 0.5f * p_th_a_next_cruise;
+    kf->modes.cruise.P[13] = p_th_a_next_cruise_1;
+    kf->modes.cruise.P[14] = p_a_a_next_cruise_1;
+    const float p_px_w_next_cruise_1 =
+        0.5f * (p_px_w_next_cruise + p_v_w_next_cruise * cos_th_cruise - p_th_w_next_cruise * t67);
+    kf->modes.cruise.P[15] = p_px_w_next_cruise_1;
+    const float p_py_w_next_cruise_1 =
+        0.5f * (p_py_w_next_cruise + p_v_w_next_cruise * sin_th_cruise
+        + p_th_w_next_cruise * f_py_th_cruise);
+    kf->modes.cruise.P[16] = p_py_w_next_cruise_1;
+    const float p_v_w_next_cruise_1 = 0.5f * p_v_w_next_cruise;
+    kf->modes.cruise.P[17] = p_v_w_next_cruise_1;
+    const float p_th_w_next_cruise_1 = 0.5f * p_th_w_next_cruise;
+    kf->modes.cruise.P[18] = p_th_w_next_cruise_1;
+    const float p_a_w_next_cruise_1 = 0.25f * p_a_w_next_cruise;
+    kf->modes.cruise.P[19] = p_a_w_next_cruise_1;
+    kf->modes.cruise.P[20] = p_w_w_next_cruise_1;
 
     /* speed: store */
     kf->modes.speed.x[MANEUVER_PX] = px_next_speed;
@@ -609,42 +659,42 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.speed.x[MANEUVER_TH] = th_speed_1;
     kf->modes.speed.x[MANEUVER_A] = a_speed_1;
     kf->modes.speed.x[MANEUVER_W] = w_next_speed;
-    kf->modes.speed.P[0] = p_px_px_speed_1;
-    const float p_px_py_speed_1 = p_px_py_speed + p_px_v_speed * sin_th_speed
-        + p_px_th_speed * f_py_th_speed + p_px_a_speed * f_py_a_speed + t71 * cos_th_speed
-        - p_py_th_speed_1 * t69 + p_py_a_speed_1 * f_px_a_speed;
-    kf->modes.speed.P[1] = p_px_py_speed_1;
-    kf->modes.speed.P[2] = p_py_py_speed_1;
-    const float p_px_v_speed_1 = t70 + p_px_a_speed_1;
-    kf->modes.speed.P[3] = p_px_v_speed_1;
-    const float p_py_v_speed_1 = t71 + p_py_a_speed_1;
-    kf->modes.speed.P[4] = p_py_v_speed_1;
-    kf->modes.speed.P[5] = p_v_v_speed_1;
-    kf->modes.speed.P[6] = p_px_th_speed_1;
-    kf->modes.speed.P[7] = p_py_th_speed_1;
-    const float p_v_th_speed_1 = p_v_th_speed + p_th_a_speed;
-    kf->modes.speed.P[8] = p_v_th_speed_1;
-    kf->modes.speed.P[9] = p_th_th_speed_1;
-    kf->modes.speed.P[10] = p_px_a_speed_1;
-    kf->modes.speed.P[11] = p_py_a_speed_1;
-    kf->modes.speed.P[12] = p_v_a_speed_1;
-    kf->modes.speed.P[13] = p_th_a_speed;
-    kf->modes.speed.P[14] = p_a_a_speed_1;
-    const float p_px_w_speed_1 = 0.5f
-        * (p_px_w_speed + p_v_w_speed * cos_th_speed - p_th_w_speed * t69
-        + p_a_w_speed * f_px_a_speed);
-    kf->modes.speed.P[15] = p_px_w_speed_1;
-    const float p_py_w_speed_1 = 0.5f
-        * (p_py_w_speed + p_v_w_speed * sin_th_speed + p_th_w_speed * f_py_th_speed
-        + p_a_w_speed * f_py_a_speed);
-    kf->modes.speed.P[16] = p_py_w_speed_1;
-    const float p_v_w_speed_1 = 0.5f * (p_v_w_speed + p_a_w_speed);
-    kf->modes.speed.P[17] = p_v_w_speed_1;
-    const float p_th_w_speed_1 = 0.5f * p_th_w_speed;
-    kf->modes.speed.P[18] = p_th_w_speed_1;
-    const float p_a_w_speed_1 = 0.5f * p_a_w_speed;
-    kf->modes.speed.P[19] = p_a_w_speed_1;
-    kf->modes.speed.P[20] = p_w_w_speed_1;
+    kf->modes.speed.P[0] = p_px_px_next_speed_1;
+    const float p_px_py_next_speed_1 = p_px_py_next_speed + p_px_v_next_speed * sin_th_speed
+        + p_px_th_next_speed * f_py_th_speed + p_px_a_next_speed * f_py_a_speed + t71 * cos_th_speed
+        - p_py_th_next_speed_1 * t69 + p_py_a_next_speed_1 * f_px_a_speed;
+    kf->modes.speed.P[1] = p_px_py_next_speed_1;
+    kf->modes.speed.P[2] = p_py_py_next_speed_1;
+    const float p_px_v_next_speed_1 = t70 + p_px_a_next_speed_1;
+    kf->modes.speed.P[3] = p_px_v_next_speed_1;
+    const float p_py_v_next_speed_1 = t71 + p_py_a_next_speed_1;
+    kf->modes.speed.P[4] = p_py_v_next_speed_1;
+    kf->modes.speed.P[5] = p_v_v_next_speed_1;
+    kf->modes.speed.P[6] = p_px_th_next_speed_1;
+    kf->modes.speed.P[7] = p_py_th_next_speed_1;
+    const float p_v_th_next_speed_1 = p_v_th_next_speed + p_th_a_next_speed;
+    kf->modes.speed.P[8] = p_v_th_next_speed_1;
+    kf->modes.speed.P[9] = p_th_th_next_speed_1;
+    kf->modes.speed.P[10] = p_px_a_next_speed_1;
+    kf->modes.speed.P[11] = p_py_a_next_speed_1;
+    kf->modes.speed.P[12] = p_v_a_next_speed_1;
+    kf->modes.speed.P[13] = p_th_a_next_speed;
+    kf->modes.speed.P[14] = p_a_a_next_speed_1;
+    const float p_px_w_next_speed_1 =
+        0.5f * (p_px_w_next_speed + p_v_w_next_speed * cos_th_speed - p_th_w_next_speed * t69
+        + p_a_w_next_speed * f_px_a_speed);
+    kf->modes.speed.P[15] = p_px_w_next_speed_1;
+    const float p_py_w_next_speed_1 =
+        0.5f * (p_py_w_next_speed + p_v_w_next_speed * sin_th_speed
+        + p_th_w_next_speed * f_py_th_speed + p_a_w_next_speed * f_py_a_speed);
+    kf->modes.speed.P[16] = p_py_w_next_speed_1;
+    const float p_v_w_next_speed_1 = 0.5f * (p_v_w_next_speed + p_a_w_next_speed);
+    kf->modes.speed.P[17] = p_v_w_next_speed_1;
+    const float p_th_w_next_speed_1 = 0.5f * p_th_w_next_speed;
+    kf->modes.speed.P[18] = p_th_w_next_speed_1;
+    const float p_a_w_next_speed_1 = 0.5f * p_a_w_next_speed;
+    kf->modes.speed.P[19] = p_a_w_next_speed_1;
+    kf->modes.speed.P[20] = p_w_w_next_speed_1;
 
     /* turn: store */
     kf->modes.turn.x[MANEUVER_PX] = px_next_turn;
@@ -653,40 +703,42 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.turn.x[MANEUVER_TH] = t77;
     kf->modes.turn.x[MANEUVER_A] = a_next_turn;
     kf->modes.turn.x[MANEUVER_W] = w_turn_1;
-    kf->modes.turn.P[0] = p_px_px_turn_1;
-    const float p_px_py_turn_1 = p_px_py_turn + p_px_v_turn * f_py_v_turn
-        + p_px_th_turn * f_py_th_turn + p_px_w_turn * f_py_w_turn + p_py_v_turn_1 * f_px_v_turn
-        - t76 * t73 - p_py_w_turn_1 * t74;
-    kf->modes.turn.P[1] = p_px_py_turn_1;
-    kf->modes.turn.P[2] = p_py_py_turn_1;
-    kf->modes.turn.P[3] = p_px_v_turn_1;
-    kf->modes.turn.P[4] = p_py_v_turn_1;
-    kf->modes.turn.P[5] = p_v_v_turn_1;
-    const float p_px_th_turn_1 = t75 + p_px_w_turn_1;
-    kf->modes.turn.P[6] = p_px_th_turn_1;
-    const float p_py_th_turn_1 = t76 + p_py_w_turn_1;
-    kf->modes.turn.P[7] = p_py_th_turn_1;
-    const float p_v_th_turn_1 = p_v_th_turn + p_v_w_turn;
-    kf->modes.turn.P[8] = p_v_th_turn_1;
-    kf->modes.turn.P[9] = p_th_th_turn_1;
-    const float p_px_a_turn_1 = 0.5f * (p_px_a_turn + p_v_a_turn * f_px_v_turn - p_th_a_turn * t73
-        - p_a_w_turn * t74);
-    kf->modes.turn.P[10] = p_px_a_turn_1;
-    const float p_py_a_turn_1 = 0.5f * (p_py_a_turn + p_v_a_turn * f_py_v_turn
-        + p_th_a_turn * f_py_th_turn + p_a_w_turn * f_py_w_turn);
-    kf->modes.turn.P[11] = p_py_a_turn_1;
-    const float p_v_a_turn_1 = 0.5f * p_v_a_turn;
-    kf->modes.turn.P[12] = p_v_a_turn_1;
-    const float p_th_a_turn_1 = 0.5f * (p_th_a_turn + p_a_w_turn);
-    kf->modes.turn.P[13] = p_th_a_turn_1;
-    kf->modes.turn.P[14] = p_a_a_turn_1;
-    kf->modes.turn.P[15] = p_px_w_turn_1;
-    kf->modes.turn.P[16] = p_py_w_turn_1;
-    kf->modes.turn.P[17] = p_v_w_turn;
-    kf->modes.turn.P[18] = p_th_w_turn_1;
-    const float p_a_w_turn_1 = 0.5f * p_a_w_turn;
-    kf->modes.turn.P[19] = p_a_w_turn_1;
-    kf->modes.turn.P[20] = p_w_w_turn_1;
+    kf->modes.turn.P[0] = p_px_px_next_turn_1;
+    const float p_px_py_next_turn_1 = p_px_py_next_turn + p_px_v_next_turn * f_py_v_turn
+        + p_px_th_next_turn * f_py_th_turn + p_px_w_next_turn * f_py_w_turn
+        + p_py_v_next_turn_1 * f_px_v_turn - t76 * t73 - p_py_w_next_turn_1 * t74;
+    kf->modes.turn.P[1] = p_px_py_next_turn_1;
+    kf->modes.turn.P[2] = p_py_py_next_turn_1;
+    kf->modes.turn.P[3] = p_px_v_next_turn_1;
+    kf->modes.turn.P[4] = p_py_v_next_turn_1;
+    kf->modes.turn.P[5] = p_v_v_next_turn_1;
+    const float p_px_th_next_turn_1 = t75 + p_px_w_next_turn_1;
+    kf->modes.turn.P[6] = p_px_th_next_turn_1;
+    const float p_py_th_next_turn_1 = t76 + p_py_w_next_turn_1;
+    kf->modes.turn.P[7] = p_py_th_next_turn_1;
+    const float p_v_th_next_turn_1 = p_v_th_next_turn + p_v_w_next_turn;
+    kf->modes.turn.P[8] = p_v_th_next_turn_1;
+    kf->modes.turn.P[9] = p_th_th_next_turn_1;
+    const float p_px_a_next_turn_1 = 0.5f
+        * (p_px_a_next_turn + p_v_a_next_turn * f_px_v_turn - p_th_a_next_turn * t73
+        - p_a_w_next_turn * t74);
+    kf->modes.turn.P[10] = p_px_a_next_turn_1;
+    const float p_py_a_next_turn_1 = 0.5f
+        * (p_py_a_next_turn + p_v_a_next_turn * f_py_v_turn + p_th_a_next_turn * f_py_th_turn
+        + p_a_w_next_turn * f_py_w_turn);
+    kf->modes.turn.P[11] = p_py_a_next_turn_1;
+    const float p_v_a_next_turn_1 = 0.5f * p_v_a_next_turn;
+    kf->modes.turn.P[12] = p_v_a_next_turn_1;
+    const float p_th_a_next_turn_1 = 0.5f * (p_th_a_next_turn + p_a_w_next_turn);
+    kf->modes.turn.P[13] = p_th_a_next_turn_1;
+    kf->modes.turn.P[14] = p_a_a_next_turn_1;
+    kf->modes.turn.P[15] = p_px_w_next_turn_1;
+    kf->modes.turn.P[16] = p_py_w_next_turn_1;
+    kf->modes.turn.P[17] = p_v_w_next_turn;
+    kf->modes.turn.P[18] = p_th_w_next_turn_1;
+    const float p_a_w_next_turn_1 = 0.5f * p_a_w_next_turn;
+    kf->modes.turn.P[19] = p_a_w_next_turn_1;
+    kf->modes.turn.P[20] = p_w_w_next_turn_1;
 
     /* store: the bank */
     kf->mu[MANEUVER_MODE_CRUISE] = mu_cruise_next;
@@ -722,18 +774,23 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float y_bearing_cruise = maneuver_wrap(z->bearing - h_bearing_cruise, 3.1415927f);
 
     /* cruise: gain and covariance: range */
-    const float t4 = kf->modes.cruise.P[0] * h_range_px_cruise
-        + kf->modes.cruise.P[1] * h_range_py_cruise;
-    const float t5 = kf->modes.cruise.P[1] * h_range_px_cruise
-        + kf->modes.cruise.P[2] * h_range_py_cruise;
-    const float t6 = kf->modes.cruise.P[3] * h_range_px_cruise
-        + kf->modes.cruise.P[4] * h_range_py_cruise;
-    const float t7 = kf->modes.cruise.P[6] * h_range_px_cruise
-        + kf->modes.cruise.P[7] * h_range_py_cruise;
-    const float t8 = kf->modes.cruise.P[10] * h_range_px_cruise
-        + kf->modes.cruise.P[11] * h_range_py_cruise;
-    const float t9 = kf->modes.cruise.P[15] * h_range_px_cruise
-        + kf->modes.cruise.P[16] * h_range_py_cruise;
+    const float p_px_px_cruise = kf->modes.cruise.P[0];
+    const float p_px_py_cruise = kf->modes.cruise.P[1];
+    const float t4 = p_px_px_cruise * h_range_px_cruise + p_px_py_cruise * h_range_py_cruise;
+    const float p_py_py_cruise = kf->modes.cruise.P[2];
+    const float t5 = p_px_py_cruise * h_range_px_cruise + p_py_py_cruise * h_range_py_cruise;
+    const float p_px_v_cruise = kf->modes.cruise.P[3];
+    const float p_py_v_cruise = kf->modes.cruise.P[4];
+    const float t6 = p_px_v_cruise * h_range_px_cruise + p_py_v_cruise * h_range_py_cruise;
+    const float p_px_th_cruise = kf->modes.cruise.P[6];
+    const float p_py_th_cruise = kf->modes.cruise.P[7];
+    const float t7 = p_px_th_cruise * h_range_px_cruise + p_py_th_cruise * h_range_py_cruise;
+    const float p_px_a_cruise = kf->modes.cruise.P[10];
+    const float p_py_a_cruise = kf->modes.cruise.P[11];
+    const float t8 = p_px_a_cruise * h_range_px_cruise + p_py_a_cruise * h_range_py_cruise;
+    const float p_px_w_cruise = kf->modes.cruise.P[15];
+    const float p_py_w_cruise = kf->modes.cruise.P[16];
+    const float t9 = p_px_w_cruise * h_range_px_cruise + p_py_w_cruise * h_range_py_cruise;
     const float s_range_cruise = h_range_px_cruise * t4 + h_range_py_cruise * t5 + 400.0f;
     const float t10 = 1.0f / s_range_cruise;
     const float t11 = t4 * t10;
@@ -747,22 +804,22 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float t19 = y_range_cruise * (y_range_cruise * t10);
 
     /* cruise: gain and covariance: bearing */
-    const float t20 = kf->modes.cruise.P[0] - t11 * t4;
-    const float t21 = kf->modes.cruise.P[1] - t11 * t5;
+    const float t20 = p_px_px_cruise - t11 * t4;
+    const float t21 = p_px_py_cruise - t11 * t5;
     const float t22 = t21 * h_bearing_py_cruise - t20 * t3;
-    const float t23 = kf->modes.cruise.P[2] - t12 * t5;
+    const float t23 = p_py_py_cruise - t12 * t5;
     const float t24 = t23 * h_bearing_py_cruise - t21 * t3;
-    const float t25 = kf->modes.cruise.P[3] - t11 * t6;
-    const float t26 = kf->modes.cruise.P[4] - t12 * t6;
+    const float t25 = p_px_v_cruise - t11 * t6;
+    const float t26 = p_py_v_cruise - t12 * t6;
     const float t27 = t26 * h_bearing_py_cruise - t25 * t3;
-    const float t28 = kf->modes.cruise.P[6] - t11 * t7;
-    const float t29 = kf->modes.cruise.P[7] - t12 * t7;
+    const float t28 = p_px_th_cruise - t11 * t7;
+    const float t29 = p_py_th_cruise - t12 * t7;
     const float t30 = t29 * h_bearing_py_cruise - t28 * t3;
-    const float t31 = kf->modes.cruise.P[10] - t11 * t8;
-    const float t32 = kf->modes.cruise.P[11] - t12 * t8;
+    const float t31 = p_px_a_cruise - t11 * t8;
+    const float t32 = p_py_a_cruise - t12 * t8;
     const float t33 = t32 * h_bearing_py_cruise - t31 * t3;
-    const float t34 = kf->modes.cruise.P[15] - t11 * t9;
-    const float t35 = kf->modes.cruise.P[16] - t12 * t9;
+    const float t34 = p_px_w_cruise - t11 * t9;
+    const float t35 = p_py_w_cruise - t12 * t9;
     const float t36 = t35 * h_bearing_py_cruise - t34 * t3;
     const float s_bearing_cruise = h_bearing_py_cruise * t24 - t3 * t22 + 1.0e-6f;
     const float t37 = 1.0f / s_bearing_cruise;
@@ -813,18 +870,23 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float y_bearing_speed = maneuver_wrap(z->bearing - h_bearing_speed, 3.1415927f);
 
     /* speed: gain and covariance: range */
-    const float t51 = kf->modes.speed.P[0] * h_range_px_speed
-        + kf->modes.speed.P[1] * h_range_py_speed;
-    const float t52 = kf->modes.speed.P[1] * h_range_px_speed
-        + kf->modes.speed.P[2] * h_range_py_speed;
-    const float t53 = kf->modes.speed.P[3] * h_range_px_speed
-        + kf->modes.speed.P[4] * h_range_py_speed;
-    const float t54 = kf->modes.speed.P[6] * h_range_px_speed
-        + kf->modes.speed.P[7] * h_range_py_speed;
-    const float t55 = kf->modes.speed.P[10] * h_range_px_speed
-        + kf->modes.speed.P[11] * h_range_py_speed;
-    const float t56 = kf->modes.speed.P[15] * h_range_px_speed
-        + kf->modes.speed.P[16] * h_range_py_speed;
+    const float p_px_px_speed = kf->modes.speed.P[0];
+    const float p_px_py_speed = kf->modes.speed.P[1];
+    const float t51 = p_px_px_speed * h_range_px_speed + p_px_py_speed * h_range_py_speed;
+    const float p_py_py_speed = kf->modes.speed.P[2];
+    const float t52 = p_px_py_speed * h_range_px_speed + p_py_py_speed * h_range_py_speed;
+    const float p_px_v_speed = kf->modes.speed.P[3];
+    const float p_py_v_speed = kf->modes.speed.P[4];
+    const float t53 = p_px_v_speed * h_range_px_speed + p_py_v_speed * h_range_py_speed;
+    const float p_px_th_speed = kf->modes.speed.P[6];
+    const float p_py_th_speed = kf->modes.speed.P[7];
+    const float t54 = p_px_th_speed * h_range_px_speed + p_py_th_speed * h_range_py_speed;
+    const float p_px_a_speed = kf->modes.speed.P[10];
+    const float p_py_a_speed = kf->modes.speed.P[11];
+    const float t55 = p_px_a_speed * h_range_px_speed + p_py_a_speed * h_range_py_speed;
+    const float p_px_w_speed = kf->modes.speed.P[15];
+    const float p_py_w_speed = kf->modes.speed.P[16];
+    const float t56 = p_px_w_speed * h_range_px_speed + p_py_w_speed * h_range_py_speed;
     const float s_range_speed = h_range_px_speed * t51 + h_range_py_speed * t52 + 400.0f;
     const float t57 = 1.0f / s_range_speed;
     const float t58 = t51 * t57;
@@ -838,22 +900,22 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float t66 = y_range_speed * (y_range_speed * t57);
 
     /* speed: gain and covariance: bearing */
-    const float t67 = kf->modes.speed.P[0] - t58 * t51;
-    const float t68 = kf->modes.speed.P[1] - t58 * t52;
+    const float t67 = p_px_px_speed - t58 * t51;
+    const float t68 = p_px_py_speed - t58 * t52;
     const float t69 = t68 * h_bearing_py_speed - t67 * t50;
-    const float t70 = kf->modes.speed.P[2] - t59 * t52;
+    const float t70 = p_py_py_speed - t59 * t52;
     const float t71 = t70 * h_bearing_py_speed - t68 * t50;
-    const float t72 = kf->modes.speed.P[3] - t58 * t53;
-    const float t73 = kf->modes.speed.P[4] - t59 * t53;
+    const float t72 = p_px_v_speed - t58 * t53;
+    const float t73 = p_py_v_speed - t59 * t53;
     const float t74 = t73 * h_bearing_py_speed - t72 * t50;
-    const float t75 = kf->modes.speed.P[6] - t58 * t54;
-    const float t76 = kf->modes.speed.P[7] - t59 * t54;
+    const float t75 = p_px_th_speed - t58 * t54;
+    const float t76 = p_py_th_speed - t59 * t54;
     const float t77 = t76 * h_bearing_py_speed - t75 * t50;
-    const float t78 = kf->modes.speed.P[10] - t58 * t55;
-    const float t79 = kf->modes.speed.P[11] - t59 * t55;
+    const float t78 = p_px_a_speed - t58 * t55;
+    const float t79 = p_py_a_speed - t59 * t55;
     const float t80 = t79 * h_bearing_py_speed - t78 * t50;
-    const float t81 = kf->modes.speed.P[15] - t58 * t56;
-    const float t82 = kf->modes.speed.P[16] - t59 * t56;
+    const float t81 = p_px_w_speed - t58 * t56;
+    const float t82 = p_py_w_speed - t59 * t56;
     const float t83 = t82 * h_bearing_py_speed - t81 * t50;
     const float s_bearing_speed = h_bearing_py_speed * t71 - t50 * t69 + 1.0e-6f;
     const float t84 = 1.0f / s_bearing_speed;
@@ -904,16 +966,23 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float y_bearing_turn = maneuver_wrap(z->bearing - h_bearing_turn, 3.1415927f);
 
     /* turn: gain and covariance: range */
-    const float t98 = kf->modes.turn.P[0] * h_range_px_turn + kf->modes.turn.P[1] * h_range_py_turn;
-    const float t99 = kf->modes.turn.P[1] * h_range_px_turn + kf->modes.turn.P[2] * h_range_py_turn;
-    const float t100 = kf->modes.turn.P[3] * h_range_px_turn
-        + kf->modes.turn.P[4] * h_range_py_turn;
-    const float t101 = kf->modes.turn.P[6] * h_range_px_turn
-        + kf->modes.turn.P[7] * h_range_py_turn;
-    const float t102 = kf->modes.turn.P[10] * h_range_px_turn
-        + kf->modes.turn.P[11] * h_range_py_turn;
-    const float t103 = kf->modes.turn.P[15] * h_range_px_turn
-        + kf->modes.turn.P[16] * h_range_py_turn;
+    const float p_px_px_turn = kf->modes.turn.P[0];
+    const float p_px_py_turn = kf->modes.turn.P[1];
+    const float t98 = p_px_px_turn * h_range_px_turn + p_px_py_turn * h_range_py_turn;
+    const float p_py_py_turn = kf->modes.turn.P[2];
+    const float t99 = p_px_py_turn * h_range_px_turn + p_py_py_turn * h_range_py_turn;
+    const float p_px_v_turn = kf->modes.turn.P[3];
+    const float p_py_v_turn = kf->modes.turn.P[4];
+    const float t100 = p_px_v_turn * h_range_px_turn + p_py_v_turn * h_range_py_turn;
+    const float p_px_th_turn = kf->modes.turn.P[6];
+    const float p_py_th_turn = kf->modes.turn.P[7];
+    const float t101 = p_px_th_turn * h_range_px_turn + p_py_th_turn * h_range_py_turn;
+    const float p_px_a_turn = kf->modes.turn.P[10];
+    const float p_py_a_turn = kf->modes.turn.P[11];
+    const float t102 = p_px_a_turn * h_range_px_turn + p_py_a_turn * h_range_py_turn;
+    const float p_px_w_turn = kf->modes.turn.P[15];
+    const float p_py_w_turn = kf->modes.turn.P[16];
+    const float t103 = p_px_w_turn * h_range_px_turn + p_py_w_turn * h_range_py_turn;
     const float s_range_turn = h_range_px_turn * t98 + h_range_py_turn * t99 + 400.0f;
     const float t104 = 1.0f / s_range_turn;
     const float t105 = t98 * t104;
@@ -927,22 +996,22 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float t113 = y_range_turn * (y_range_turn * t104);
 
     /* turn: gain and covariance: bearing */
-    const float t114 = kf->modes.turn.P[0] - t105 * t98;
-    const float t115 = kf->modes.turn.P[1] - t105 * t99;
+    const float t114 = p_px_px_turn - t105 * t98;
+    const float t115 = p_px_py_turn - t105 * t99;
     const float t116 = t115 * h_bearing_py_turn - t114 * t97;
-    const float t117 = kf->modes.turn.P[2] - t106 * t99;
+    const float t117 = p_py_py_turn - t106 * t99;
     const float t118 = t117 * h_bearing_py_turn - t115 * t97;
-    const float t119 = kf->modes.turn.P[3] - t105 * t100;
-    const float t120 = kf->modes.turn.P[4] - t106 * t100;
+    const float t119 = p_px_v_turn - t105 * t100;
+    const float t120 = p_py_v_turn - t106 * t100;
     const float t121 = t120 * h_bearing_py_turn - t119 * t97;
-    const float t122 = kf->modes.turn.P[6] - t105 * t101;
-    const float t123 = kf->modes.turn.P[7] - t106 * t101;
+    const float t122 = p_px_th_turn - t105 * t101;
+    const float t123 = p_py_th_turn - t106 * t101;
     const float t124 = t123 * h_bearing_py_turn - t122 * t97;
-    const float t125 = kf->modes.turn.P[10] - t105 * t102;
-    const float t126 = kf->modes.turn.P[11] - t106 * t102;
+    const float t125 = p_px_a_turn - t105 * t102;
+    const float t126 = p_py_a_turn - t106 * t102;
     const float t127 = t126 * h_bearing_py_turn - t125 * t97;
-    const float t128 = kf->modes.turn.P[15] - t105 * t103;
-    const float t129 = kf->modes.turn.P[16] - t106 * t103;
+    const float t128 = p_px_w_turn - t105 * t103;
+    const float t129 = p_py_w_turn - t106 * t103;
     const float t130 = t129 * h_bearing_py_turn - t128 * t97;
     const float s_bearing_turn = h_bearing_py_turn * t118 - t97 * t116 + 1.0e-6f;
     const float t131 = 1.0f / s_bearing_turn;
@@ -1058,48 +1127,58 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->modes.cruise.x[MANEUVER_TH] = t46;
     kf->modes.cruise.x[MANEUVER_A] = a_next_cruise;
     kf->modes.cruise.x[MANEUVER_W] = w_next_cruise;
-    const float p_px_px_cruise = t20 - t38 * t22;
-    kf->modes.cruise.P[0] = p_px_px_cruise;
-    const float p_px_py_cruise = t21 - t38 * t24;
-    kf->modes.cruise.P[1] = p_px_py_cruise;
-    const float p_py_py_cruise = t23 - t39 * t24;
-    kf->modes.cruise.P[2] = p_py_py_cruise;
-    const float p_px_v_cruise = t25 - t38 * t27;
-    kf->modes.cruise.P[3] = p_px_v_cruise;
-    const float p_py_v_cruise = t26 - t39 * t27;
-    kf->modes.cruise.P[4] = p_py_v_cruise;
-    const float p_v_v_cruise = kf->modes.cruise.P[5] - t13 * t6 - t40 * t27;
-    kf->modes.cruise.P[5] = p_v_v_cruise;
-    const float p_px_th_cruise = t28 - t38 * t30;
-    kf->modes.cruise.P[6] = p_px_th_cruise;
-    const float p_py_th_cruise = t29 - t39 * t30;
-    kf->modes.cruise.P[7] = p_py_th_cruise;
-    const float p_v_th_cruise = kf->modes.cruise.P[8] - t13 * t7 - t40 * t30;
-    kf->modes.cruise.P[8] = p_v_th_cruise;
-    const float p_th_th_cruise = kf->modes.cruise.P[9] - t14 * t7 - t41 * t30;
-    kf->modes.cruise.P[9] = p_th_th_cruise;
-    const float p_px_a_cruise = t31 - t38 * t33;
-    kf->modes.cruise.P[10] = p_px_a_cruise;
-    const float p_py_a_cruise = t32 - t39 * t33;
-    kf->modes.cruise.P[11] = p_py_a_cruise;
-    const float p_v_a_cruise = kf->modes.cruise.P[12] - t13 * t8 - t40 * t33;
-    kf->modes.cruise.P[12] = p_v_a_cruise;
-    const float p_th_a_cruise = kf->modes.cruise.P[13] - t14 * t8 - t41 * t33;
-    kf->modes.cruise.P[13] = p_th_a_cruise;
-    const float p_a_a_cruise = kf->modes.cruise.P[14] - t15 * t8 - t42 * t33;
-    kf->modes.cruise.P[14] = p_a_a_cruise;
-    const float p_px_w_cruise = t34 - t38 * t36;
-    kf->modes.cruise.P[15] = p_px_w_cruise;
-    const float p_py_w_cruise = t35 - t39 * t36;
-    kf->modes.cruise.P[16] = p_py_w_cruise;
-    const float p_v_w_cruise = kf->modes.cruise.P[17] - t13 * t9 - t40 * t36;
-    kf->modes.cruise.P[17] = p_v_w_cruise;
-    const float p_th_w_cruise = kf->modes.cruise.P[18] - t14 * t9 - t41 * t36;
-    kf->modes.cruise.P[18] = p_th_w_cruise;
-    const float p_a_w_cruise = kf->modes.cruise.P[19] - t15 * t9 - t42 * t36;
-    kf->modes.cruise.P[19] = p_a_w_cruise;
-    const float p_w_w_cruise = kf->modes.cruise.P[20] - t16 * t9 - t43 * t36;
-    kf->modes.cruise.P[20] = p_w_w_cruise;
+    const float p_px_px_next_cruise = t20 - t38 * t22;
+    kf->modes.cruise.P[0] = p_px_px_next_cruise;
+    const float p_px_py_next_cruise = t21 - t38 * t24;
+    kf->modes.cruise.P[1] = p_px_py_next_cruise;
+    const float p_py_py_next_cruise = t23 - t39 * t24;
+    kf->modes.cruise.P[2] = p_py_py_next_cruise;
+    const float p_px_v_next_cruise = t25 - t38 * t27;
+    kf->modes.cruise.P[3] = p_px_v_next_cruise;
+    const float p_py_v_next_cruise = t26 - t39 * t27;
+    kf->modes.cruise.P[4] = p_py_v_next_cruise;
+    const float p_v_v_cruise = kf->modes.cruise.P[5];
+    const float p_v_v_next_cruise = p_v_v_cruise - t13 * t6 - t40 * t27;
+    kf->modes.cruise.P[5] = p_v_v_next_cruise;
+    const float p_px_th_next_cruise = t28 - t38 * t30;
+    kf->modes.cruise.P[6] = p_px_th_next_cruise;
+    const float p_py_th_next_cruise = t29 - t39 * t30;
+    kf->modes.cruise.P[7] = p_py_th_next_cruise;
+    const float p_v_th_cruise = kf->modes.cruise.P[8];
+    const float p_v_th_next_cruise = p_v_th_cruise - t13 * t7 - t40 * t30;
+    kf->modes.cruise.P[8] = p_v_th_next_cruise;
+    const float p_th_th_cruise = kf->modes.cruise.P[9];
+    const float p_th_th_next_cruise = p_th_th_cruise - t14 * t7 - t41 * t30;
+    kf->modes.cruise.P[9] = p_th_th_next_cruise;
+    const float p_px_a_next_cruise = t31 - t38 * t33;
+    kf->modes.cruise.P[10] = p_px_a_next_cruise;
+    const float p_py_a_next_cruise = t32 - t39 * t33;
+    kf->modes.cruise.P[11] = p_py_a_next_cruise;
+    const float p_v_a_cruise = kf->modes.cruise.P[12];
+    const float p_v_a_next_cruise = p_v_a_cruise - t13 * t8 - t40 * t33;
+    kf->modes.cruise.P[12] = p_v_a_next_cruise;
+    const float p_th_a_cruise = kf->modes.cruise.P[13];
+    const float p_th_a_next_cruise = p_th_a_cruise - t14 * t8 - t41 * t33;
+    kf->modes.cruise.P[13] = p_th_a_next_cruise;
+    const float p_a_a_cruise = kf->modes.cruise.P[14];
+    const float p_a_a_next_cruise = p_a_a_cruise - t15 * t8 - t42 * t33;
+    kf->modes.cruise.P[14] = p_a_a_next_cruise;
+    const float p_px_w_next_cruise = t34 - t38 * t36;
+    kf->modes.cruise.P[15] = p_px_w_next_cruise;
+    const float p_py_w_next_cruise = t35 - t39 * t36;
+    kf->modes.cruise.P[16] = p_py_w_next_cruise;
+    const float p_v_w_cruise = kf->modes.cruise.P[17];
+    const float p_v_w_next_cruise = p_v_w_cruise - t13 * t9 - t40 * t36;
+    kf->modes.cruise.P[17] = p_v_w_next_cruise;
+    const float p_th_w_cruise = kf->modes.cruise.P[18];
+    const float p_th_w_next_cruise = p_th_w_cruise - t14 * t9 - t41 * t36;
+    kf->modes.cruise.P[18] = p_th_w_next_cruise;
+    const float p_a_w_cruise = kf->modes.cruise.P[19];
+    const float p_a_w_next_cruise = p_a_w_cruise - t15 * t9 - t42 * t36;
+    kf->modes.cruise.P[19] = p_a_w_next_cruise;
+    const float p_w_w_cruise = kf->modes.cruise.P[20];
+    const float p_w_w_next_cruise = p_w_w_cruise - t16 * t9 - t43 * t36;
+    kf->modes.cruise.P[20] = p_w_w_next_cruise;
 
     /* speed: store */
     kf->modes.speed.x[MANEUVER_PX] = px_next_speed;
@@ -1108,48 +1187,58 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->modes.speed.x[MANEUVER_TH] = t93;
     kf->modes.speed.x[MANEUVER_A] = a_next_speed;
     kf->modes.speed.x[MANEUVER_W] = w_next_speed;
-    const float p_px_px_speed = t67 - t85 * t69;
-    kf->modes.speed.P[0] = p_px_px_speed;
-    const float p_px_py_speed = t68 - t85 * t71;
-    kf->modes.speed.P[1] = p_px_py_speed;
-    const float p_py_py_speed = t70 - t86 * t71;
-    kf->modes.speed.P[2] = p_py_py_speed;
-    const float p_px_v_speed = t72 - t85 * t74;
-    kf->modes.speed.P[3] = p_px_v_speed;
-    const float p_py_v_speed = t73 - t86 * t74;
-    kf->modes.speed.P[4] = p_py_v_speed;
-    const float p_v_v_speed = kf->modes.speed.P[5] - t60 * t53 - t87 * t74;
-    kf->modes.speed.P[5] = p_v_v_speed;
-    const float p_px_th_speed = t75 - t85 * t77;
-    kf->modes.speed.P[6] = p_px_th_speed;
-    const float p_py_th_speed = t76 - t86 * t77;
-    kf->modes.speed.P[7] = p_py_th_speed;
-    const float p_v_th_speed = kf->modes.speed.P[8] - t60 * t54 - t87 * t77;
-    kf->modes.speed.P[8] = p_v_th_speed;
-    const float p_th_th_speed = kf->modes.speed.P[9] - t61 * t54 - t88 * t77;
-    kf->modes.speed.P[9] = p_th_th_speed;
-    const float p_px_a_speed = t78 - t85 * t80;
-    kf->modes.speed.P[10] = p_px_a_speed;
-    const float p_py_a_speed = t79 - t86 * t80;
-    kf->modes.speed.P[11] = p_py_a_speed;
-    const float p_v_a_speed = kf->modes.speed.P[12] - t60 * t55 - t87 * t80;
-    kf->modes.speed.P[12] = p_v_a_speed;
-    const float p_th_a_speed = kf->modes.speed.P[13] - t61 * t55 - t88 * t80;
-    kf->modes.speed.P[13] = p_th_a_speed;
-    const float p_a_a_speed = kf->modes.speed.P[14] - t62 * t55 - t89 * t80;
-    kf->modes.speed.P[14] = p_a_a_speed;
-    const float p_px_w_speed = t81 - t85 * t83;
-    kf->modes.speed.P[15] = p_px_w_speed;
-    const float p_py_w_speed = t82 - t86 * t83;
-    kf->modes.speed.P[16] = p_py_w_speed;
-    const float p_v_w_speed = kf->modes.speed.P[17] - t60 * t56 - t87 * t83;
-    kf->modes.speed.P[17] = p_v_w_speed;
-    const float p_th_w_speed = kf->modes.speed.P[18] - t61 * t56 - t88 * t83;
-    kf->modes.speed.P[18] = p_th_w_speed;
-    const float p_a_w_speed = kf->modes.speed.P[19] - t62 * t56 - t89 * t83;
-    kf->modes.speed.P[19] = p_a_w_speed;
-    const float p_w_w_speed = kf->modes.speed.P[20] - t63 * t56 - t90 * t83;
-    kf->modes.speed.P[20] = p_w_w_speed;
+    const float p_px_px_next_speed = t67 - t85 * t69;
+    kf->modes.speed.P[0] = p_px_px_next_speed;
+    const float p_px_py_next_speed = t68 - t85 * t71;
+    kf->modes.speed.P[1] = p_px_py_next_speed;
+    const float p_py_py_next_speed = t70 - t86 * t71;
+    kf->modes.speed.P[2] = p_py_py_next_speed;
+    const float p_px_v_next_speed = t72 - t85 * t74;
+    kf->modes.speed.P[3] = p_px_v_next_speed;
+    const float p_py_v_next_speed = t73 - t86 * t74;
+    kf->modes.speed.P[4] = p_py_v_next_speed;
+    const float p_v_v_speed = kf->modes.speed.P[5];
+    const float p_v_v_next_speed = p_v_v_speed - t60 * t53 - t87 * t74;
+    kf->modes.speed.P[5] = p_v_v_next_speed;
+    const float p_px_th_next_speed = t75 - t85 * t77;
+    kf->modes.speed.P[6] = p_px_th_next_speed;
+    const float p_py_th_next_speed = t76 - t86 * t77;
+    kf->modes.speed.P[7] = p_py_th_next_speed;
+    const float p_v_th_speed = kf->modes.speed.P[8];
+    const float p_v_th_next_speed = p_v_th_speed - t60 * t54 - t87 * t77;
+    kf->modes.speed.P[8] = p_v_th_next_speed;
+    const float p_th_th_speed = kf->modes.speed.P[9];
+    const float p_th_th_next_speed = p_th_th_speed - t61 * t54 - t88 * t77;
+    kf->modes.speed.P[9] = p_th_th_next_speed;
+    const float p_px_a_next_speed = t78 - t85 * t80;
+    kf->modes.speed.P[10] = p_px_a_next_speed;
+    const float p_py_a_next_speed = t79 - t86 * t80;
+    kf->modes.speed.P[11] = p_py_a_next_speed;
+    const float p_v_a_speed = kf->modes.speed.P[12];
+    const float p_v_a_next_speed = p_v_a_speed - t60 * t55 - t87 * t80;
+    kf->modes.speed.P[12] = p_v_a_next_speed;
+    const float p_th_a_speed = kf->modes.speed.P[13];
+    const float p_th_a_next_speed = p_th_a_speed - t61 * t55 - t88 * t80;
+    kf->modes.speed.P[13] = p_th_a_next_speed;
+    const float p_a_a_speed = kf->modes.speed.P[14];
+    const float p_a_a_next_speed = p_a_a_speed - t62 * t55 - t89 * t80;
+    kf->modes.speed.P[14] = p_a_a_next_speed;
+    const float p_px_w_next_speed = t81 - t85 * t83;
+    kf->modes.speed.P[15] = p_px_w_next_speed;
+    const float p_py_w_next_speed = t82 - t86 * t83;
+    kf->modes.speed.P[16] = p_py_w_next_speed;
+    const float p_v_w_speed = kf->modes.speed.P[17];
+    const float p_v_w_next_speed = p_v_w_speed - t60 * t56 - t87 * t83;
+    kf->modes.speed.P[17] = p_v_w_next_speed;
+    const float p_th_w_speed = kf->modes.speed.P[18];
+    const float p_th_w_next_speed = p_th_w_speed - t61 * t56 - t88 * t83;
+    kf->modes.speed.P[18] = p_th_w_next_speed;
+    const float p_a_w_speed = kf->modes.speed.P[19];
+    const float p_a_w_next_speed = p_a_w_speed - t62 * t56 - t89 * t83;
+    kf->modes.speed.P[19] = p_a_w_next_speed;
+    const float p_w_w_speed = kf->modes.speed.P[20];
+    const float p_w_w_next_speed = p_w_w_speed - t63 * t56 - t90 * t83;
+    kf->modes.speed.P[20] = p_w_w_next_speed;
 
     /* turn: store */
     kf->modes.turn.x[MANEUVER_PX] = px_next_turn;
@@ -1158,48 +1247,58 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->modes.turn.x[MANEUVER_TH] = t140;
     kf->modes.turn.x[MANEUVER_A] = a_next_turn;
     kf->modes.turn.x[MANEUVER_W] = w_next_turn;
-    const float p_px_px_turn = t114 - t132 * t116;
-    kf->modes.turn.P[0] = p_px_px_turn;
-    const float p_px_py_turn = t115 - t132 * t118;
-    kf->modes.turn.P[1] = p_px_py_turn;
-    const float p_py_py_turn = t117 - t133 * t118;
-    kf->modes.turn.P[2] = p_py_py_turn;
-    const float p_px_v_turn = t119 - t132 * t121;
-    kf->modes.turn.P[3] = p_px_v_turn;
-    const float p_py_v_turn = t120 - t133 * t121;
-    kf->modes.turn.P[4] = p_py_v_turn;
-    const float p_v_v_turn = kf->modes.turn.P[5] - t107 * t100 - t134 * t121;
-    kf->modes.turn.P[5] = p_v_v_turn;
-    const float p_px_th_turn = t122 - t132 * t124;
-    kf->modes.turn.P[6] = p_px_th_turn;
-    const float p_py_th_turn = t123 - t133 * t124;
-    kf->modes.turn.P[7] = p_py_th_turn;
-    const float p_v_th_turn = kf->modes.turn.P[8] - t107 * t101 - t134 * t124;
-    kf->modes.turn.P[8] = p_v_th_turn;
-    const float p_th_th_turn = kf->modes.turn.P[9] - t108 * t101 - t135 * t124;
-    kf->modes.turn.P[9] = p_th_th_turn;
-    const float p_px_a_turn = t125 - t132 * t127;
-    kf->modes.turn.P[10] = p_px_a_turn;
-    const float p_py_a_turn = t126 - t133 * t127;
-    kf->modes.turn.P[11] = p_py_a_turn;
-    const float p_v_a_turn = kf->modes.turn.P[12] - t107 * t102 - t134 * t127;
-    kf->modes.turn.P[12] = p_v_a_turn;
-    const float p_th_a_turn = kf->modes.turn.P[13] - t108 * t102 - t135 * t127;
-    kf->modes.turn.P[13] = p_th_a_turn;
-    const float p_a_a_turn = kf->modes.turn.P[14] - t109 * t102 - t136 * t127;
-    kf->modes.turn.P[14] = p_a_a_turn;
-    const float p_px_w_turn = t128 - t132 * t130;
-    kf->modes.turn.P[15] = p_px_w_turn;
-    const float p_py_w_turn = t129 - t133 * t130;
-    kf->modes.turn.P[16] = p_py_w_turn;
-    const float p_v_w_turn = kf->modes.turn.P[17] - t107 * t103 - t134 * t130;
-    kf->modes.turn.P[17] = p_v_w_turn;
-    const float p_th_w_turn = kf->modes.turn.P[18] - t108 * t103 - t135 * t130;
-    kf->modes.turn.P[18] = p_th_w_turn;
-    const float p_a_w_turn = kf->modes.turn.P[19] - t109 * t103 - t136 * t130;
-    kf->modes.turn.P[19] = p_a_w_turn;
-    const float p_w_w_turn = kf->modes.turn.P[20] - t110 * t103 - t137 * t130;
-    kf->modes.turn.P[20] = p_w_w_turn;
+    const float p_px_px_next_turn = t114 - t132 * t116;
+    kf->modes.turn.P[0] = p_px_px_next_turn;
+    const float p_px_py_next_turn = t115 - t132 * t118;
+    kf->modes.turn.P[1] = p_px_py_next_turn;
+    const float p_py_py_next_turn = t117 - t133 * t118;
+    kf->modes.turn.P[2] = p_py_py_next_turn;
+    const float p_px_v_next_turn = t119 - t132 * t121;
+    kf->modes.turn.P[3] = p_px_v_next_turn;
+    const float p_py_v_next_turn = t120 - t133 * t121;
+    kf->modes.turn.P[4] = p_py_v_next_turn;
+    const float p_v_v_turn = kf->modes.turn.P[5];
+    const float p_v_v_next_turn = p_v_v_turn - t107 * t100 - t134 * t121;
+    kf->modes.turn.P[5] = p_v_v_next_turn;
+    const float p_px_th_next_turn = t122 - t132 * t124;
+    kf->modes.turn.P[6] = p_px_th_next_turn;
+    const float p_py_th_next_turn = t123 - t133 * t124;
+    kf->modes.turn.P[7] = p_py_th_next_turn;
+    const float p_v_th_turn = kf->modes.turn.P[8];
+    const float p_v_th_next_turn = p_v_th_turn - t107 * t101 - t134 * t124;
+    kf->modes.turn.P[8] = p_v_th_next_turn;
+    const float p_th_th_turn = kf->modes.turn.P[9];
+    const float p_th_th_next_turn = p_th_th_turn - t108 * t101 - t135 * t124;
+    kf->modes.turn.P[9] = p_th_th_next_turn;
+    const float p_px_a_next_turn = t125 - t132 * t127;
+    kf->modes.turn.P[10] = p_px_a_next_turn;
+    const float p_py_a_next_turn = t126 - t133 * t127;
+    kf->modes.turn.P[11] = p_py_a_next_turn;
+    const float p_v_a_turn = kf->modes.turn.P[12];
+    const float p_v_a_next_turn = p_v_a_turn - t107 * t102 - t134 * t127;
+    kf->modes.turn.P[12] = p_v_a_next_turn;
+    const float p_th_a_turn = kf->modes.turn.P[13];
+    const float p_th_a_next_turn = p_th_a_turn - t108 * t102 - t135 * t127;
+    kf->modes.turn.P[13] = p_th_a_next_turn;
+    const float p_a_a_turn = kf->modes.turn.P[14];
+    const float p_a_a_next_turn = p_a_a_turn - t109 * t102 - t136 * t127;
+    kf->modes.turn.P[14] = p_a_a_next_turn;
+    const float p_px_w_next_turn = t128 - t132 * t130;
+    kf->modes.turn.P[15] = p_px_w_next_turn;
+    const float p_py_w_next_turn = t129 - t133 * t130;
+    kf->modes.turn.P[16] = p_py_w_next_turn;
+    const float p_v_w_turn = kf->modes.turn.P[17];
+    const float p_v_w_next_turn = p_v_w_turn - t107 * t103 - t134 * t130;
+    kf->modes.turn.P[17] = p_v_w_next_turn;
+    const float p_th_w_turn = kf->modes.turn.P[18];
+    const float p_th_w_next_turn = p_th_w_turn - t108 * t103 - t135 * t130;
+    kf->modes.turn.P[18] = p_th_w_next_turn;
+    const float p_a_w_turn = kf->modes.turn.P[19];
+    const float p_a_w_next_turn = p_a_w_turn - t109 * t103 - t136 * t130;
+    kf->modes.turn.P[19] = p_a_w_next_turn;
+    const float p_w_w_turn = kf->modes.turn.P[20];
+    const float p_w_w_next_turn = p_w_w_turn - t110 * t103 - t137 * t130;
+    kf->modes.turn.P[20] = p_w_w_next_turn;
 
     /* store: the bank */
     kf->mu[MANEUVER_MODE_CRUISE] = mu_cruise_next;

@@ -87,17 +87,17 @@ typedef struct {
 
 typedef struct {
     maneuver_real_t x[6];  /* state */
-    maneuver_real_t P[21]; /* covariance, upper triangle column by column */
+    maneuver_real_t P[21]; /* covariance: P_ij, i <= j, at j (j + 1) / 2 + i */
 } maneuver_mode_cruise_t;
 
 typedef struct {
     maneuver_real_t x[6];  /* state */
-    maneuver_real_t P[21]; /* covariance, upper triangle column by column */
+    maneuver_real_t P[21]; /* covariance: P_ij, i <= j, at j (j + 1) / 2 + i */
 } maneuver_mode_speed_t;
 
 typedef struct {
     maneuver_real_t x[6];  /* state */
-    maneuver_real_t P[21]; /* covariance, upper triangle column by column */
+    maneuver_real_t P[21]; /* covariance: P_ij, i <= j, at j (j + 1) / 2 + i */
 } maneuver_mode_turn_t;
 
 /* The filter. Plain data: copy it, keep as many as you like. */

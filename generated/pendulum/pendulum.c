@@ -131,8 +131,10 @@ pendulum_status_t pendulum_predict(pendulum_t *kf)
 
     /* sigma points */
     float points[32];
-    const float t1 = 1.118034f * kf->S[0];
-    const float t2 = 1.118034f * kf->S[1];
+    const float s_angle_angle = kf->S[0];
+    const float t1 = 1.118034f * s_angle_angle;
+    const float s_rate_angle = kf->S[1];
+    const float t2 = 1.118034f * s_rate_angle;
     points[0] = t1;
     points[1] = t2;
     points[2] = 0.0f;
@@ -142,7 +144,8 @@ pendulum_status_t pendulum_predict(pendulum_t *kf)
     points[6] = 0.0f;
     points[7] = 0.0f;
     points[8] = 0.0f;
-    const float t3 = 1.118034f * kf->S[2];
+    const float s_rate_rate = kf->S[2];
+    const float t3 = 1.118034f * s_rate_rate;
     points[9] = t3;
     points[10] = 0.0f;
     points[11] = 0.0f;
@@ -214,24 +217,24 @@ pendulum_status_t pendulum_predict(pendulum_t *kf)
     d_angle = t11;
 
     /* roots */
-    const float s_rate_rate = sqrtf(d_rate);
-    const float s_angle_angle = sqrtf(d_angle);
-    const float s_rate_angle = u_rate_angle * s_angle_angle;
+    const float s_rate_rate_next = sqrtf(d_rate);
+    const float s_angle_angle_next = sqrtf(d_angle);
+    const float s_rate_angle_next = u_rate_angle * s_angle_angle_next;
     const float angle_next = angle_centre + mean_angle;
     const float rate_next = rate_centre + mean_rate;
     const float t15 = pendulum_wrap(angle_next, 3.1415927f);
 
     /* guards */
-    if (!pendulum_finite(t15 + rate_next + s_rate_rate + s_angle_angle)) {
+    if (!pendulum_finite(t15 + rate_next + s_rate_rate_next + s_angle_angle_next)) {
         return PENDULUM_NOT_FINITE;
     }
 
     /* store */
     kf->x[PENDULUM_ANGLE] = t15;
     kf->x[PENDULUM_RATE] = rate_next;
-    kf->S[0] = s_angle_angle;
-    kf->S[1] = s_rate_angle;
-    kf->S[2] = s_rate_rate;
+    kf->S[0] = s_angle_angle_next;
+    kf->S[1] = s_rate_angle_next;
+    kf->S[2] = s_rate_rate_next;
     return PENDULUM_OK;
 }
 
@@ -244,14 +247,17 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
     const float angle = kf->x[PENDULUM_ANGLE];
     float seen[9];
     float cloud[8];
-    const float t0 = 0.8660254f * kf->S[0];
-    const float t1 = 0.8660254f * kf->S[1];
+    const float s_angle_angle = kf->S[0];
+    const float t0 = 0.8660254f * s_angle_angle;
+    const float s_rate_angle = kf->S[1];
+    const float t1 = 0.8660254f * s_rate_angle;
     cloud[0] = t0;
     cloud[1] = t1;
     cloud[2] = -t0;
     cloud[3] = -t1;
     cloud[4] = 0.0f;
-    const float t2 = 0.8660254f * kf->S[2];
+    const float s_rate_rate = kf->S[2];
+    const float t2 = 0.8660254f * s_rate_rate;
     cloud[5] = t2;
     cloud[6] = 0.0f;
     cloud[7] = -t2;
@@ -290,7 +296,7 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
     const float t11 = 1.0f / sqrtf(s_x);
     const float t12 = seen[7] * t11;
     const float t13 = seen[5] * t11;
-    const float t14 = kf->S[0] * kf->S[0];
+    const float t14 = s_angle_angle * s_angle_angle;
     const float t15 = 3.637979e-12f * t14;
     const float t16 = t13 * t13;
     const bool t17 = t15 < t16;
@@ -300,20 +306,20 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
     const bool t20 = !t19;
     const bool t21 = t17 && t20;
     const float t22 = sqrtf(t21 ? t18 : 1.0f);
-    const float t23 = t21 ? 1.0f / kf->S[0] : 0.0f;
+    const float t23 = t21 ? 1.0f / s_angle_angle : 0.0f;
     const float t24 = t13 * t23;
-    const float t25 = t19 ? 0.0f : (t21 ? t22 : kf->S[0]);
-    const float t26 = (kf->S[1] - t24 * t12) * (t21 ? kf->S[0] * (1.0f / t22) : 1.0f);
+    const float t25 = t19 ? 0.0f : (t21 ? t22 : s_angle_angle);
+    const float t26 = (s_rate_angle - t24 * t12) * (t21 ? s_angle_angle * (1.0f / t22) : 1.0f);
     const float t27 = (t21 ? t22 * t23 : 1.0f) * t12 - t24 * t26;
-    const float t28 = kf->S[2] * kf->S[2];
-    const float t29 = 3.637979e-12f * (t28 + kf->S[1] * kf->S[1]);
+    const float t28 = s_rate_rate * s_rate_rate;
+    const float t29 = 3.637979e-12f * (t28 + s_rate_angle * s_rate_angle);
     const float t30 = t27 * t27;
     const bool t31 = t20 && t29 < t30;
     const float t32 = t28 - t30;
     const bool t33 = t31 && t32 <= 1.9073486e-6f * t28;
     if (t33) { flags |= PENDULUM_REGULARIZED; }
     const bool t34 = t31 && !t33;
-    const float t35 = t33 ? 0.0f : (t34 ? sqrtf(t34 ? t32 : 1.0f) : kf->S[2]);
+    const float t35 = t33 ? 0.0f : (t34 ? sqrtf(t34 ? t32 : 1.0f) : s_rate_rate);
     const float t36 = 1.0f / sqrtf(s_y);
     const float t37 = t7 * t36;
     const float t38 = t6 * t36;
@@ -328,10 +334,10 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
     const float t46 = sqrtf(t45 ? t42 : 1.0f);
     const float t47 = t45 ? 1.0f / t25 : 0.0f;
     const float t48 = t38 * t47;
-    const float s_angle_angle = t43 ? 0.0f : (t45 ? t46 : t25);
+    const float s_angle_angle_next = t43 ? 0.0f : (t45 ? t46 : t25);
     const float t49 = ((t19 ? 0.0f : t26) - t48 * t37) * (t45 ? t25 * (1.0f / t46) : 1.0f);
     const float t50 = (t45 ? t46 * t47 : 1.0f) * t37 - t48 * t49;
-    const float s_rate_angle = t43 ? 0.0f : t49;
+    const float s_rate_angle_next = t43 ? 0.0f : t49;
     const float t51 = t50 * t50;
     const bool t52 = t44 && t29 < t51;
     const float t53 = t35 * t35;
@@ -339,7 +345,7 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
     const bool t55 = t52 && t54 <= 1.9073486e-6f * t53;
     if (t55) { flags |= PENDULUM_REGULARIZED; }
     const bool t56 = t52 && !t55;
-    const float s_rate_rate = t55 ? 0.0f : (t56 ? sqrtf(t56 ? t54 : 1.0f) : t35);
+    const float s_rate_rate_next = t55 ? 0.0f : (t56 ? sqrtf(t56 ? t54 : 1.0f) : t35);
 
     /* state */
     const float rate_next = kf->x[PENDULUM_RATE] + seen[7] * t8 + t7 * t9;
@@ -352,9 +358,9 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
     /* store */
     kf->x[PENDULUM_ANGLE] = t57;
     kf->x[PENDULUM_RATE] = rate_next;
-    kf->S[0] = s_angle_angle;
-    kf->S[1] = s_rate_angle;
-    kf->S[2] = s_rate_rate;
+    kf->S[0] = s_angle_angle_next;
+    kf->S[1] = s_rate_angle_next;
+    kf->S[2] = s_rate_rate_next;
     kf->gate_count_camera = 0;
     kf->nis = nis;
     return flags;

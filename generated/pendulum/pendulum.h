@@ -66,7 +66,8 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     pendulum_real_t x[2];       /* state */
-    pendulum_real_t S[3];       /* lower triangular root by rows: P = S S^T */
+    /* lower triangular root, P = S S^T: S_ij, i >= j, at i (i + 1) / 2 + j */
+    pendulum_real_t S[3];
     pendulum_real_t nis;        /* normalised innovation squared of the last update */
     uint32_t gate_count_camera; /* measurements of camera refused in a row */
 } pendulum_t;

@@ -25,13 +25,14 @@ scalar_status_t scalar_predict(scalar_t *kf)
     if (kf == NULL) { return SCALAR_NULL_ARGUMENT; }
 
     /* process noise */
-    const float d_level = kf->D[0] + 0.0001f;
+    const float d_level = kf->D[0];
+    const float d_level_next = d_level + 0.0001f;
 
     /* guards */
-    if (!scalar_finite(d_level)) { return SCALAR_NOT_FINITE; }
+    if (!scalar_finite(d_level_next)) { return SCALAR_NOT_FINITE; }
 
     /* store */
-    kf->D[0] = d_level;
+    kf->D[0] = d_level_next;
     return SCALAR_OK;
 }
 
@@ -44,13 +45,14 @@ scalar_status_t scalar_update_gauge(scalar_t *kf, const scalar_gauge_t *z)
     const float y_height = z->height - level;
 
     /* gain and covariance */
-    const float s_height = 0.01f + kf->D[0];
+    const float d_level = kf->D[0];
+    const float s_height = 0.01f + d_level;
     const float t0 = 1.0f / s_height;
-    const float d_level = kf->D[0] * (0.01f * t0);
+    const float d_level_next = d_level * (0.01f * t0);
     const float nis = y_height * (y_height * t0);
 
     /* state and innovation squared */
-    const float level_next = level + kf->D[0] * t0 * y_height;
+    const float level_next = level + d_level * t0 * y_height;
 
     /* guards */
     if (!scalar_finite(level_next + nis)) { return SCALAR_NOT_FINITE; }
@@ -58,7 +60,7 @@ scalar_status_t scalar_update_gauge(scalar_t *kf, const scalar_gauge_t *z)
 
     /* store */
     kf->x[SCALAR_LEVEL] = level_next;
-    kf->D[0] = d_level;
+    kf->D[0] = d_level_next;
     kf->nis = nis;
     return SCALAR_OK;
 }

@@ -90,7 +90,7 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     vehicle_real_t x[5];             /* state */
-    /* unit upper triangular factor, strict upper triangle by columns */
+    /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     vehicle_real_t U[10];
     vehicle_real_t D[5];             /* diagonal factor: P = U D U^T */
     vehicle_parameters_t parameters; /* may be changed while the filter runs */

@@ -66,79 +66,90 @@ vehicle_tutorial_status_t vehicle_tutorial_predict(vehicle_tutorial_t *kf)
     const float f_py_v = 0.33333334f * sin_th;
 
     /* F U D U^T F^T + Q */
-    const float t1 = kf->U[0] + f_px_v;
-    const float t2 = kf->U[1] + f_px_v * kf->U[2];
-    const float t3 = f_py_v * kf->U[2] + 1.0f;
-    const float t4 = kf->U[3] + f_px_v * kf->U[4] - t0;
-    const float t5 = f_py_v * kf->U[4] + kf->U[5] + f_py_th;
-    const float d_th = 0.083333336f + kf->D[3];
-    const float t6 = 1.0f / d_th;
-    const float t7 = kf->D[3] * t6;
-    const float t8 = kf->D[3] * (0.083333336f * t6);
-    const float u_px_th = t7 * t4;
-    const float u_v_th = t7 * kf->U[4];
-    const float u_py_th = t7 * t5;
-    const float t9 = kf->D[2] * t3;
+    const float u_px_v = kf->U[0];
+    const float t1 = u_px_v + f_px_v;
+    const float u_px_py = kf->U[1];
+    const float u_v_py = kf->U[2];
+    const float t2 = u_px_py + f_px_v * u_v_py;
+    const float t3 = f_py_v * u_v_py + 1.0f;
+    const float u_px_th = kf->U[3];
+    const float u_v_th = kf->U[4];
+    const float t4 = u_px_th + f_px_v * u_v_th - t0;
+    const float u_py_th = kf->U[5];
+    const float t5 = f_py_v * u_v_th + u_py_th + f_py_th;
+    const float d_th = kf->D[3];
+    const float d_th_next = 0.083333336f + d_th;
+    const float t6 = 1.0f / d_th_next;
+    const float t7 = d_th * t6;
+    const float t8 = d_th * (0.083333336f * t6);
+    const float u_px_th_next = t7 * t4;
+    const float u_v_th_next = t7 * u_v_th;
+    const float u_py_th_next = t7 * t5;
+    const float d_py = kf->D[2];
+    const float t9 = d_py * t3;
     const float t10 = t9 * t3;
     const bool t11 = t10 > 0.0f;
     const float t12 = t11 ? t9 / t10 : 0.0f;
-    const float t13 = t11 ? 0.0f : kf->D[2];
-    const float t14 = kf->D[1] * f_py_v;
+    const float t13 = t11 ? 0.0f : d_py;
+    const float d_v = kf->D[1];
+    const float t14 = d_v * f_py_v;
     const float t15 = t10 + f_py_v * t14;
     const bool t16 = t15 > 0.0f;
     const float t17 = t16 ? t14 / t15 : 0.0f;
     const float t18 = t16 ? t10 / t15 : 1.0f;
-    const float t19 = kf->D[1] * t18;
+    const float t19 = d_v * t18;
     const float t20 = t8 * t5;
-    const float d_py = t15 + t5 * t20;
-    const bool t21 = d_py > 0.0f;
-    const float t22 = t21 ? t20 / d_py : 0.0f;
-    const float t23 = t21 ? t15 / d_py : 1.0f;
+    const float d_py_next = t15 + t5 * t20;
+    const bool t21 = d_py_next > 0.0f;
+    const float t22 = t21 ? t20 / d_py_next : 0.0f;
+    const float t23 = t21 ? t15 / d_py_next : 1.0f;
     const float t24 = t8 * t23;
     const float t25 = t12 * t2;
     const float t26 = t18 * t25 + t17 * t1;
     const float t27 = t1 - f_py_v * t25;
-    const float u_px_py = t23 * t26 + t22 * t4;
-    const float t28 = t12 * kf->U[2];
+    const float u_px_py_next = t23 * t26 + t22 * t4;
+    const float t28 = t12 * u_v_py;
     const float t29 = t18 * t28 + t17;
     const float t30 = 1.0f - f_py_v * t28;
-    const float u_v_py = t23 * t29 + t22 * kf->U[4];
-    const float t31 = kf->U[4] - t5 * t29;
+    const float u_v_py_next = t23 * t29 + t22 * u_v_th;
+    const float t31 = u_v_th - t5 * t29;
     const float t32 = t19 * t30;
     const float t33 = 8.333333f + t30 * t32;
     const float t34 = 1.0f / t33;
-    const float t35 = t13 * kf->U[2];
-    const float t36 = t33 + kf->U[2] * t35;
+    const float t35 = t13 * u_v_py;
+    const float t36 = t33 + u_v_py * t35;
     const float t37 = 1.0f / t36;
     const float t38 = t24 * t31;
-    const float d_v = t36 + t31 * t38;
-    const float t39 = 1.0f / d_v;
+    const float d_v_next = t36 + t31 * t38;
+    const float t39 = 1.0f / d_v_next;
     const float t40 = t32 * t34 * t27;
-    const float t41 = t2 - kf->U[2] * t40;
+    const float t41 = t2 - u_v_py * t40;
     const float t42 = t40 + t35 * t37 * t41;
     const float t43 = t4 - t5 * t26 - t31 * t42;
-    const float u_px_v = t42 + t38 * t39 * t43;
-    const float d_px = kf->D[0] + t27 * (t19 * (8.333333f * t34) * t27)
+    const float u_px_v_next = t42 + t38 * t39 * t43;
+    const float d_px = kf->D[0];
+    const float d_px_next = d_px + t27 * (t19 * (8.333333f * t34) * t27)
         + t41 * (t13 * (t33 * t37) * t41) + t43 * (t24 * (t36 * t39) * t43);
 
     /* guards */
-    if (!vehicle_tutorial_finite(px_next + py_next + d_px + d_v + d_py + d_th)) {
+    if (!vehicle_tutorial_finite(px_next + py_next + d_px_next + d_v_next + d_py_next
+        + d_th_next)) {
         return VEHICLE_TUTORIAL_NOT_FINITE;
     }
 
     /* store */
     kf->x[VEHICLE_TUTORIAL_PX] = px_next;
     kf->x[VEHICLE_TUTORIAL_PY] = py_next;
-    kf->U[0] = u_px_v;
-    kf->U[1] = u_px_py;
-    kf->U[2] = u_v_py;
-    kf->U[3] = u_px_th;
-    kf->U[4] = u_v_th;
-    kf->U[5] = u_py_th;
-    kf->D[0] = d_px;
-    kf->D[1] = d_v;
-    kf->D[2] = d_py;
-    kf->D[3] = d_th;
+    kf->U[0] = u_px_v_next;
+    kf->U[1] = u_px_py_next;
+    kf->U[2] = u_v_py_next;
+    kf->U[3] = u_px_th_next;
+    kf->U[4] = u_v_th_next;
+    kf->U[5] = u_py_th_next;
+    kf->D[0] = d_px_next;
+    kf->D[1] = d_v_next;
+    kf->D[2] = d_py_next;
+    kf->D[3] = d_th_next;
     return VEHICLE_TUTORIAL_OK;
 }
 
@@ -154,57 +165,67 @@ vehicle_tutorial_status_t vehicle_tutorial_update_position(vehicle_tutorial_t *k
     const float y_y = z->y - py;
 
     /* gain and covariance: x, y */
-    const float t0 = 0.6477453f + kf->D[0];
+    const float d_px = kf->D[0];
+    const float t0 = 0.6477453f + d_px;
     const float t1 = 1.0f / t0;
-    const float t2 = kf->D[0] * t1;
-    const float d_px = kf->D[0] * (0.6477453f * t1);
-    const float t3 = kf->D[1] * kf->U[0];
-    const float t4 = t0 + kf->U[0] * t3;
+    const float t2 = d_px * t1;
+    const float d_px_next = d_px * (0.6477453f * t1);
+    const float d_v = kf->D[1];
+    const float u_px_v = kf->U[0];
+    const float t3 = d_v * u_px_v;
+    const float t4 = t0 + u_px_v * t3;
     const float t5 = 1.0f / t4;
     const float t6 = t3 * t5;
-    const float d_v = kf->D[1] * (t0 * t5);
-    const float u_px_v = kf->U[0] - kf->U[0] * t2;
-    const float t7 = t2 + t6 * u_px_v;
-    const float t8 = kf->D[2] * kf->U[1];
-    const float t9 = t4 + kf->U[1] * t8;
+    const float d_v_next = d_v * (t0 * t5);
+    const float u_px_v_next = u_px_v - u_px_v * t2;
+    const float t7 = t2 + t6 * u_px_v_next;
+    const float d_py = kf->D[2];
+    const float u_px_py = kf->U[1];
+    const float t8 = d_py * u_px_py;
+    const float t9 = t4 + u_px_py * t8;
     const float t10 = 1.0f / t9;
     const float t11 = t8 * t10;
-    const float t12 = kf->D[2] * (t4 * t10);
+    const float t12 = d_py * (t4 * t10);
     const float t13 = 0.6477453f + t12;
     const float t14 = 1.0f / t13;
     const float t15 = t12 * t14;
-    const float d_py = t12 * (0.6477453f * t14);
-    const float u_v_py = kf->U[2] - kf->U[1] * t6;
-    const float t16 = t6 + t11 * u_v_py;
-    const float t17 = t15 * u_v_py;
-    const float u_px_py = kf->U[1] - kf->U[1] * t7;
-    const float t18 = t7 + t11 * u_px_py;
-    const float t19 = t15 * u_px_py;
-    const float t20 = kf->D[3] * kf->U[3];
-    const float s_x = t9 + kf->U[3] * t20;
+    const float d_py_next = t12 * (0.6477453f * t14);
+    const float u_v_py = kf->U[2];
+    const float u_v_py_next = u_v_py - u_px_py * t6;
+    const float t16 = t6 + t11 * u_v_py_next;
+    const float t17 = t15 * u_v_py_next;
+    const float u_px_py_next = u_px_py - u_px_py * t7;
+    const float t18 = t7 + t11 * u_px_py_next;
+    const float t19 = t15 * u_px_py_next;
+    const float d_th = kf->D[3];
+    const float u_px_th = kf->U[3];
+    const float t20 = d_th * u_px_th;
+    const float s_x = t9 + u_px_th * t20;
     const float t21 = 1.0f / s_x;
     const float t22 = t20 * t21;
-    const float t23 = kf->D[3] * (t9 * t21);
-    const float t24 = kf->U[5] - kf->U[3] * t11;
+    const float t23 = d_th * (t9 * t21);
+    const float u_py_th = kf->U[5];
+    const float t24 = u_py_th - u_px_th * t11;
     const float t25 = t23 * t24;
     const float s_y = t13 + t24 * t25;
     const float t26 = 1.0f / s_y;
     const float t27 = t25 * t26;
-    const float d_th = t23 * (t13 * t26);
-    const float u_py_th = t24 - t24 * t15;
-    const float t28 = kf->U[4] - kf->U[3] * t16;
-    const float u_v_th = t28 - t24 * t17;
-    const float t29 = kf->U[3] - kf->U[3] * t18;
-    const float u_px_th = t29 - t24 * t19;
+    const float d_th_next = t23 * (t13 * t26);
+    const float u_py_th_next = t24 - t24 * t15;
+    const float u_v_th = kf->U[4];
+    const float t28 = u_v_th - u_px_th * t16;
+    const float u_v_th_next = t28 - t24 * t17;
+    const float t29 = u_px_th - u_px_th * t18;
+    const float u_px_th_next = t29 - t24 * t19;
     const float t30 = (t11 + t22 * t24) * y_x;
     const float nu_y = y_y - t30;
     const float nis = y_x * (y_x * t21) + nu_y * (nu_y * t26);
 
     /* state and innovation squared */
-    const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_th) * nu_y;
+    const float px_next = px + (t18 + t22 * t29) * y_x + (t19 + t27 * u_px_th_next) * nu_y;
     const float v_next = kf->x[VEHICLE_TUTORIAL_V] + (t16 + t22 * t28) * y_x
-        + (t17 + t27 * u_v_th) * nu_y;
-    const float py_next = py + t30 + (t15 + t27 * u_py_th) * nu_y;
+        + (t17 + t27 * u_v_th_next) * nu_y;
+    const float py_next = py + t30 + (t15 + t27 * u_py_th_next) * nu_y;
     const float th_next = kf->x[VEHICLE_TUTORIAL_TH] + t22 * y_x + t27 * nu_y;
 
     /* guards */
@@ -218,16 +239,16 @@ vehicle_tutorial_status_t vehicle_tutorial_update_position(vehicle_tutorial_t *k
     kf->x[VEHICLE_TUTORIAL_PY] = py_next;
     kf->x[VEHICLE_TUTORIAL_V] = v_next;
     kf->x[VEHICLE_TUTORIAL_TH] = th_next;
-    kf->U[0] = u_px_v;
-    kf->U[1] = u_px_py;
-    kf->U[2] = u_v_py;
-    kf->U[3] = u_px_th;
-    kf->U[4] = u_v_th;
-    kf->U[5] = u_py_th;
-    kf->D[0] = d_px;
-    kf->D[1] = d_v;
-    kf->D[2] = d_py;
-    kf->D[3] = d_th;
+    kf->U[0] = u_px_v_next;
+    kf->U[1] = u_px_py_next;
+    kf->U[2] = u_v_py_next;
+    kf->U[3] = u_px_th_next;
+    kf->U[4] = u_v_th_next;
+    kf->U[5] = u_py_th_next;
+    kf->D[0] = d_px_next;
+    kf->D[1] = d_v_next;
+    kf->D[2] = d_py_next;
+    kf->D[3] = d_th_next;
     kf->nis = nis;
     return VEHICLE_TUTORIAL_OK;
 }

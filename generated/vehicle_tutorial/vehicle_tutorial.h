@@ -73,7 +73,7 @@ typedef struct {
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     vehicle_tutorial_real_t x[4]; /* state */
-    /* unit upper triangular factor, strict upper triangle by columns */
+    /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     vehicle_tutorial_real_t U[6];
     vehicle_tutorial_real_t D[4]; /* diagonal factor: P = U D U^T */
     vehicle_tutorial_real_t nis;  /* normalised innovation squared of the last update */

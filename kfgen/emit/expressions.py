@@ -28,12 +28,16 @@ class Expressions:
         self.helpers: set[str] = set()
 
     def expression(self, node: Node, context: int = TERNARY) -> str:
+        if node.op == "variable":
+            return str(node.data)
         text, strength = self._print(node)
         return f"({text})" if strength < context else text
 
     def _print(self, node: Node) -> tuple[str, int]:
         e = self.expression
         match node.op:
+            case "sum":
+                return self._sum(node)
             case "const":
                 return self._constant(node)
             case "field":
@@ -46,8 +50,6 @@ class Expressions:
                 return (f"{node.data}[{e(node.args[0])}]" if node.args else node.data), _ATOM
             case "variable" | "counter":
                 return node.data, _ATOM
-            case "sum":
-                return self._sum(node)
             case "real":
                 return f"({self.scalar.c_type}){e(node.args[0], _ATOM)}", _UNARY
             case "lookup":

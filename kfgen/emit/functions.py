@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from kfgen.emit.data import FunctionView
+from kfgen.emit.entries import Entry, with_entries
 from kfgen.emit.fixed_point import may_saturate
 from kfgen.emit.printer import Printer
 from kfgen.emit.text import WIDTH, comment, fill, with_unit
@@ -30,6 +31,12 @@ class FunctionMaker:
         self.name = self.spec.name
         self.NAME = self.name.upper()
         self.helpers: set[str] = set()
+        self.entries = {
+            (f"kf.{b.name}", i): Entry(name, b.points[i] if b.points else None)
+            for b in code.blocks
+            for i, name in enumerate(b.entries)
+        }
+        self.taken = frozenset(f"{self.name}_{f.name}" for f in code.functions) | set(tables.values())
 
     def make(self, f: Function) -> FunctionView:
         saturates = self.fixed and may_saturate(f)
@@ -37,7 +44,7 @@ class FunctionMaker:
         printer = Printer(self.name, self.scalar, self._index_name, self.tables)
         if f.private:
             printer.status = "flags"
-        body = printer.statements(f.body)
+        body = printer.statements(with_entries(f.body, self.entries, self.taken, self.name))
         self.helpers |= printer.helpers
         prototype = self._prototype(f)
         cost = cost_of(f) if is_counted(f) else ""

@@ -40,15 +40,15 @@ class Printer(Expressions):
         match statement:
             case Section(text=text):
                 return comment(text, depth)
-            case Let(node=node, name=name):
+            case Let(node=node, name=name, point=point):
                 kind = {"real": real, "bool": "bool", "int": "int", "long": "int64_t"}[node.kind]
-                return wrapped(f"const {kind} {name} = {e(node)};", depth)
-            case Declare(name=name, size=size, value=value, kind=kind):
+                return _noted(wrapped(f"const {kind} {name} = {e(node)};", depth), depth, point)
+            case Declare(name=name, size=size, value=value, kind=kind, point=point):
                 c_kind = real if kind == "real" else kind
                 if size is not None:
                     return wrapped(f"{c_kind} {name}[{size}];", depth)
                 assert value is not None
-                return wrapped(f"{c_kind} {name} = {e(value)};", depth)
+                return _noted(wrapped(f"{c_kind} {name} = {e(value)};", depth), depth, point)
             case Assign(name=name, index=index, node=node):
                 target = name if index is None else f"{name}[{e(index)}]"
                 return wrapped(f"{target} = {e(node)};", depth)
@@ -90,3 +90,13 @@ class Printer(Expressions):
             return self.expression(given)
         path = self.path(given.array)
         return path if given.offset.constant == 0 else f"&{path}[{self.expression(given.offset)}]"
+
+
+def _noted(lines: list[str], depth: int, point: int | None) -> list[str]:
+    """A declaration with the value of its raw 1: behind it, or above where there is no room."""
+    if point is None:
+        return lines
+    note = f"/* 2^{point} */"
+    if len(lines[-1]) + 1 + len(note) <= WIDTH:
+        return [*lines[:-1], f"{lines[-1]} {note}"]
+    return ["    " * depth + note, *lines]

@@ -15,7 +15,9 @@ from kfgen.model import Model
 class Block:
     """A field of the filter's struct: `size` numbers (None: a single one).
 
-    compact: what is initially the same nearly everywhere is set everywhere first.
+    compact: what is initially the same nearly everywhere is set everywhere first. entries: what each number is called
+    where it is read by its place (`p_px_vx`); empty where numbers are read in loops.
+    points: of fixed point, the exponent of each number's raw 1.
     """
 
     name: str
@@ -24,6 +26,8 @@ class Block:
     kind: str = "real"  # real | uint32 | bool
     initial: tuple[Fraction, ...] = ()
     compact: bool = False
+    entries: tuple[str, ...] = ()
+    points: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 
 from kfgen.ir.nodes import Node
 
@@ -17,20 +17,22 @@ class Section:
 
 @dataclass(slots=True)
 class Let:
-    """A constant local: name = node."""
+    """A constant local: name = node. point: of fixed point, the value of its raw 1 is 2^point."""
 
     node: Node
     name: str
+    point: int | None = None
 
 
 @dataclass(slots=True)
 class Declare:
-    """A local array of reals, or (size None) a variable with its first value."""
+    """A local array of reals, or (size None) a variable with its first value. point: as that of a Let."""
 
     name: str
     size: int | None
     value: Node | None = None
     kind: str = "real"
+    point: int | None = None
 
 
 @dataclass(slots=True)
@@ -155,6 +157,32 @@ def roots(statement: Statement) -> list[Node]:
             return slices + [a for a in args if isinstance(a, Node)]
         case Section():
             return []
+
+
+def mapped(statement: Statement, new: Callable[[Node], Node]) -> Statement:
+    """The statement with `new` of each node that it itself evaluates."""
+    match statement:
+        case Let(node=node):
+            return replace(statement, node=new(node))
+        case Assign(index=index, node=node) | Store(index=index, node=node):
+            return replace(statement, index=None if index is None else new(index), node=new(node))
+        case Declare(value=value):
+            return replace(statement, value=None if value is None else new(value))
+        case Guard(condition=condition, before=before):
+            stores = [replace(store, node=new(store.node)) for store in before]
+            return replace(statement, condition=new(condition), before=stores)
+        case Flag(condition=condition) | If(condition=condition):
+            return replace(statement, condition=new(condition))
+        case For(start=start, stop=stop):
+            return replace(statement, start=new(start), stop=new(stop))
+        case Call(args=args):
+            given = [
+                replace(a, offset=new(a.offset)) if isinstance(a, Slice) else new(a) if isinstance(a, Node) else a
+                for a in args
+            ]
+            return replace(statement, args=given)
+        case Section():
+            return statement
 
 
 def walk(body: list[Statement]) -> Iterator[Statement]:

@@ -11,20 +11,7 @@ from dataclasses import replace
 
 from kfgen.ir.nodes import Node
 from kfgen.ir.overwritten import Overwritten
-from kfgen.ir.program import (
-    Assign,
-    Call,
-    Declare,
-    Flag,
-    For,
-    Guard,
-    If,
-    Let,
-    Section,
-    Slice,
-    Statement,
-    Store,
-)  # fmt: skip
+from kfgen.ir.program import Declare, For, If, Let, Section, Statement, mapped
 from kfgen.ir.recording import Block
 from kfgen.ir.sharing import Sharing
 from kfgen.ir.trace import Trace
@@ -143,28 +130,10 @@ class _Scheduler:
         return _without_empty_sections(out)
 
     def _statement(self, item: Statement) -> Statement:
-        op = self._operand
-        match item:
-            case Store() | Assign():
-                return replace(item, index=None if item.index is None else op(item.index), node=op(item.node))
-            case Declare():
-                return replace(item, value=None if item.value is None else op(item.value))
-            case Guard():
-                before = [replace(s, node=op(s.node)) for s in item.before]
-                return replace(item, condition=op(item.condition), before=before)
-            case Call(args=args):
-                given = [replace(a, offset=op(a.offset)) if isinstance(a, Slice) else op(a) if isinstance(a, Node)
-                         else a for a in args]  # fmt: skip
-                return replace(item, args=given)
-            case Flag():
-                return replace(item, condition=op(item.condition))
-            case For():
-                body = self._block(self.trace.blocks[id(item)])
-                return replace(item, start=op(item.start), stop=op(item.stop), body=body)
-            case If():
-                return replace(item, condition=op(item.condition), body=self._block(self.trace.blocks[id(item)]))
-            case _:
-                return item
+        if isinstance(item, For):
+            item = replace(item, body=self._block(self.trace.blocks[id(item)]))
+        made = mapped(item, self._operand)
+        return replace(made, body=self._block(self.trace.blocks[id(item)])) if isinstance(made, If) else made
 
 
 def _without_empty_sections(body: list[Statement]) -> list[Statement]:

@@ -50,9 +50,7 @@ class Imm:
         forms = [f.form for f in filters]
         self.mixers = [form.mixer(forms) for form in forms]
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
-        fields = [
-            replace(block, name=f"modes.{mode.name}.{block.name}") for mode in self.modes for block in mode.blocks
-        ]
+        fields = [field for mode in self.modes for field in mode.fields()]
         mu = Block("mu", len(self.modes), "probabilities of the modes", initial=bank.mu0)
         states = ("kf.x", *(mode.path("x") for mode in self.modes))
         self.outdated = outdated

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kfgen.filters.bank.trace import Scope
 from kfgen.filters.base import Block
@@ -20,6 +20,14 @@ class Mode:
 
     def scope(self) -> Scope:
         return Scope(self.name, frozenset(block.name for block in self.blocks))
+
+    def fields(self) -> list[Block]:
+        """Its blocks as fields of the bank."""
+        return [
+            replace(block, name=f"modes.{self.name}.{block.name}",
+                    entries=tuple(f"{entry}_{self.name}" for entry in block.entries))
+            for block in self.blocks
+        ]  # fmt: skip
 
     @property
     def model(self) -> Model:

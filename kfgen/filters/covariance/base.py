@@ -40,8 +40,12 @@ class Form(Protocol[P]):
 
     # in the struct
 
-    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
-        """The fields of the struct that hold it, with the values of P0 (n, n)."""
+    def blocks(self, P0: list[list[Fraction]], names: Sequence[str]) -> list[Block]:
+        """The fields of the struct that hold it, with the values of P0 (n, n). names: of the states."""
+        ...
+
+    def named(self, blocks: list[Block]) -> list[Block]:
+        """The same fields; without names for their numbers where these are read by counters."""
         ...
 
     def get(self, t: Trace, i: Value, j: Value) -> Value:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra.factors import udu
@@ -11,18 +12,22 @@ from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.algebra.triangles import upper, upper_start
 from kfgen.filters.base import Block
+from kfgen.filters.covariance.names import entries
 from kfgen.ir.trace import Trace, Value
 
 
 class Kept:
-    """A covariance in a field of the struct, dense or as its factors. initial: (k, k)."""
+    """A covariance in a field of the struct, dense or as its factors. initial: (k, k); names: of its k places."""
 
-    def __init__(self, field: str, initial: list[list[Fraction]], factored: bool, doc: str) -> None:
+    def __init__(
+        self, field: str, initial: list[list[Fraction]], factored: bool, doc: str, names: Sequence[str]
+    ) -> None:
         self.field = field
         self.k = len(initial)
         self.initial = initial
         self.factored = factored
-        self.doc = doc + (": U above D, by columns" if factored else ": upper triangle by columns")
+        self.names = names
+        self.doc = doc + f": {'U above D' if factored else 'entries'} i <= j at j (j + 1) / 2 + i"
 
     def block(self) -> Block:
         matrix: Rows = self.initial
@@ -30,7 +35,7 @@ class Kept:
             U, D = udu([list(row) for row in self.initial])
             matrix = [[D[i] if i == j else U[i][j] for j in range(self.k)] for i in range(self.k)]
         flat = tuple(Fraction(matrix[i][j]) for j in range(self.k) for i in range(j + 1))
-        return Block(self.field, len(flat), self.doc, initial=flat)
+        return Block(self.field, len(flat), self.doc, initial=flat, entries=entries(self.field[0].lower(), self.names))
 
     def factors(self, t: Trace) -> tuple[Rows, Vector]:
         """U, D as they are kept. What is positive at first stays so: it is only ever multiplied and added to."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
+from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.motion import Moved
 from kfgen.ir.trace import Trace, Value
@@ -22,6 +23,9 @@ class StraightLine:
 
     def mixer(self, forms: Sequence[Form[Any]]) -> None:
         return None
+
+    def named(self, blocks: list[Block]) -> list[Block]:
+        return blocks
 
     def kept(self, t: Trace, x: list[Value], before: list[Value]) -> list[Value]:
         return x

@@ -48,7 +48,7 @@ class SingleFilter(ABC):
         for sensor in model.sensors:
             adapted = self.adapted_R(sensor)
             extra += [] if adapted is None else adapted.blocks()
-        extra += self.extra_blocks()
+        extra = form.named([*extra, *self.extra_blocks()])
         outdated = (self.outdated,) if self.outdated else ()
         self.covariance = CovarianceCode(model, form, scalar.epsilon, self.outdated)
         self.state = StateCode(model, self.covariance.blocks(), tuple(extra), outdated)

@@ -34,7 +34,8 @@ class AdaptedR:
         self.rate = model.options.adapt_R
         self.m = len(sensor.h)
         self.residual_field = f"residual_{sensor.name}"
-        self.kept = Kept(f"R_{sensor.name}", _constants(sensor.R), factored, f"R of {sensor.name}, adapted")
+        names = [c.name for c in sensor.spec.components]
+        self.kept = Kept(f"R_{sensor.name}", _constants(sensor.R), factored, f"R of {sensor.name}, adapted", names)
         self.smallest = self.m * epsilon
         self.next: Symmetric | None = None
 
@@ -87,7 +88,8 @@ class AdaptedQ:
         assert model.options.adapt_Q is not None
         self.rate = model.options.adapt_Q
         Q = _constants(model.Q)
-        self.kept = Kept("Q", [[Q[i][j] for j in order] for i in order], factored, "additive process noise, adapted")
+        doc, names = "additive process noise, adapted", [model.states[i] for i in order]
+        self.kept = Kept("Q", [[Q[i][j] for j in order] for i in order], factored, doc, names)
         self.smallest = len(order) * epsilon
 
     def additive(self, t: Trace, added: Rows | None) -> Additive:

@@ -61,7 +61,7 @@ class Carry:
     def local(self, s: Let) -> list[Statement]:
         """A local of a chain in 64 bits, beside the rounded one."""
         cell = self.members.get(s.name)
-        return [] if cell is None else _by_terms(self.long(s.node, cell), s.name + SUFFIX)
+        return [] if cell is None else _by_terms(self.long(s.node, cell), s.name + SUFFIX, self._point(cell))
 
     def cleared(self, cell: Cell) -> Store:
         """What forgets the rest of a cell that is given anew."""
@@ -75,14 +75,18 @@ class Carry:
         long = self.long(s.node, cell)
         if long.op != "variable":
             name = f"{s.name.rpartition('.')[2].lower()}_{affine(s.index)[0] if s.index is not None else 0}{SUFFIX}"
-            lets += _by_terms(long, name)
+            lets += _by_terms(long, name, self._point(cell))
             long = make("variable", (), name, LONG)
         rest = make("q_rest", (long,), (CARRIED,))
         return lets, make("q_word", (long,), (CARRIED,)), replace(self.cleared(cell), node=rest)
 
+    def _point(self, cell: Cell) -> int:
+        """The exponent of a chain's words."""
+        return self.c.formats.fixed[cell] - CARRIED
+
     def long(self, node: Node, cell: Cell) -> Node:
         """An expression on a chain, in 64 bits, with CARRIED bits more than its cell has."""
-        e = self.c.formats.fixed[cell] - CARRIED
+        e = self._point(cell)
         path = self._path(cell)
         match node.op:
             case "element" if path.depth(node) == 0:
@@ -207,13 +211,13 @@ class Carry:
         return make("q_gather", (total, a.node, b.node), (e - a.e - b.e,), LONG)
 
 
-def _by_terms(node: Node, name: str) -> list[Statement]:
+def _by_terms(node: Node, name: str, e: int) -> list[Statement]:
     """A local of 64 bits, a statement for each term of its sum."""
-    out = [Let(node, name)]
+    out = [Let(node, name, e)]
     while node.op in _TERMS and node.args[0].op in _TERMS:
         inner, before = node.args[0], f"{name}{len(out)}"
         first = make("variable", (), before, LONG)
         out[-1] = replace(out[-1], node=make(node.op, (first, *node.args[1:]), node.data, LONG))
-        out.append(Let(inner, before))
+        out.append(Let(inner, before, e))
         node = inner
     return [*reversed(out)]

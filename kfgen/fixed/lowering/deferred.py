@@ -71,7 +71,7 @@ class Deferred:
         raw = self.x.value(node)
         if raw.node.op in ("variable", "element", "field"):
             return raw
-        out.append(Let(raw.node, name))
+        out.append(Let(raw.node, name, raw.e))
         return replace(raw, node=make("variable", (), name))
 
 

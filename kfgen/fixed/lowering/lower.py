@@ -30,11 +30,10 @@ def lower(code: FilterCode, formats: Formats) -> FilterCode:
         done[f.name] = Statements(context, done).function()
     blocks = []
     for block in code.blocks:
-        initial = tuple(
-            _raw(value, formats.of(formats.arrays.element(("array", f"kf.{block.name}"), i)), formats.bits)
-            for i, value in enumerate(block.initial)
-        )
-        blocks.append(replace(block, initial=initial))
+        cells = [formats.arrays.element(("array", f"kf.{block.name}"), i) for i in range(len(block.initial))]
+        points = tuple(-formats.bits if e is None else e for e in map(formats.of, cells))
+        initial = tuple(Fraction(rounded(value, e)) for value, e in zip(block.initial, points, strict=True))
+        blocks.append(replace(block, initial=initial, points=points))
     if code.modes and formats.bits < FINE:
         blocks.append(Block("rest", len(code.modes), PROBABILITY, initial=tuple(_rests(code, formats))))
     if formats.carried:
@@ -51,8 +50,4 @@ def _rests(code: FilterCode, formats: Formats) -> Iterator[Fraction]:
     """What mu0 has below its LSB."""
     (mu,) = (block for block in code.blocks if block.name == "mu")
     for value in mu.initial:
-        yield _raw(value, -FINE, FINE) - (_raw(value, -formats.bits, formats.bits) * 2 ** (FINE - formats.bits))
-
-
-def _raw(value: Fraction, e: int | None, bits: int) -> Fraction:
-    return Fraction(rounded(value, -bits if e is None else e))
+        yield Fraction(rounded(value, -FINE) - (rounded(value, -formats.bits) << (FINE - formats.bits)))

@@ -97,7 +97,7 @@ class Statements:
                 if value.kind != "real":
                     return [replace(s, value=self.x.index(value))]
                 e = self.exponent(("variable", self.f.name, name))
-                return [replace(s, value=self.x.value(value, e).node)]
+                return [replace(s, value=self.x.value(value, e).node, point=e)]
             case Assign():
                 return [self.store(s)]
             case Store() if s.name == "kf.mu" and self.c.formats.bits < FINE:
@@ -154,7 +154,7 @@ class Statements:
             self.c.locals[name] = raw
             return []
         self.c.locals[name] = replace(raw, node=make("variable", (), name))
-        return [Let(raw.node, name)]
+        return [Let(raw.node, name, raw.e)]
 
     def outside(self, name: str) -> bool:
         """Whether a local is stored where the user sees it, with all 31 bits."""
@@ -186,7 +186,7 @@ class Statements:
         word = make("q_shift", (fine,), (k,))
         rest = make("sub", (fine, make("mul", (word, constant(1 << k)))))
         made = between(self.x.value(s.node, -FINE).node, 1 << FINE)
-        return [Let(made, name), Store(s.name, index, word), Store("kf.rest", index, rest)]
+        return [Let(made, name, -FINE), Store(s.name, index, word), Store("kf.rest", index, rest)]
 
     def carried(self, s: Store, cell: Cell) -> list[Statement]:
         """A store with its rest."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from fractions import Fraction
@@ -46,8 +46,8 @@ class LoopedFull(Looped, FullStore):
         other.updates = replace(self.updates, change=None)
         return other
 
-    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
-        return [replace(block, compact=True) for block in super().blocks(P0)]
+    def blocks(self, P0: list[list[Fraction]], names: Sequence[str]) -> list[Block]:
+        return [replace(block, compact=True) for block in super().blocks(P0, names)]
 
     def load(self, t: Trace) -> ArrayEntries:
         return ArrayEntries(Space(t), self.n, self.kernels)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra.numbers import select, sqrt
 from kfgen.filters.algebra.triangles import upper_size, upper_start
 from kfgen.filters.base import Block
+from kfgen.filters.covariance.names import entries
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 
@@ -22,9 +24,10 @@ class FullStore:
         self.n = n
         self.order = list(range(n))
 
-    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
+    def blocks(self, P0: list[list[Fraction]], names: Sequence[str]) -> list[Block]:
         flat = tuple(P0[i][j] for j in range(self.n) for i in range(j + 1))
-        return [Block("P", len(flat), "covariance, upper triangle column by column", initial=flat)]
+        doc = "covariance: P_ij, i <= j, at j (j + 1) / 2 + i"
+        return [Block("P", len(flat), doc, initial=flat, entries=entries("p", names))]
 
     def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
         return []

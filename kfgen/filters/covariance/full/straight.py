@@ -14,6 +14,7 @@ from kfgen.filters.covariance.full.store import FullStore
 from kfgen.filters.covariance.gather import GatheredEntries
 from kfgen.filters.covariance.loops.partly import EntriesInLoops
 from kfgen.filters.covariance.motion import VectorGain
+from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Scalar
 from kfgen.filters.covariance.straight import StraightLine
@@ -135,7 +136,7 @@ class StraightFull(StraightLine, FullStore):
         for last, j in enumerate(self.sequence if after_predict else range(self.n)):
             for i in self.sequence[: last + 1] if after_predict else range(j + 1):
                 low, high = min(i, j), max(i, j)
-                t.store("kf.P", upper(low, high), t.name(t.value(P[low, high]), f"p_{names[low]}_{names[high]}"))
+                t.store("kf.P", upper(low, high), t.name(t.value(P[low, high]), entry_next("p", names, low, high)))
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
         return assembled(U, D)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Protocol, Self
 
+from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Form, Straight
 from kfgen.filters.covariance.kernels.function import Kernels
 from kfgen.filters.covariance.loops.motion import Displacement
@@ -59,6 +60,9 @@ class Looped:
     def mixer(self, forms: Sequence[Form[Any]]) -> Self | None:
         """Itself, where all are of this form, in this order."""
         return self if all(isinstance(each, type(self)) and each.order == self.order for each in forms) else None
+
+    def named(self, blocks: list[Block]) -> list[Block]:
+        return [replace(block, entries=()) for block in blocks]
 
     def kept(self, t: Trace, x: list[Value], before: list[Value]) -> list[Value]:
         return kept_in_array(t, x, before)

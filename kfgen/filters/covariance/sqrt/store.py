@@ -5,6 +5,7 @@ Inside, the states are in reverse order: S is then upper triangular, and the ker
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra.factors import udu
@@ -12,6 +13,7 @@ from kfgen.filters.algebra.numbers import constant_root, select, sqrt
 from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.kernels.function import integer
+from kfgen.filters.covariance.names import entry
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
@@ -44,7 +46,7 @@ class SqrtStore:
             return self.packed(i, j)
         return self.place(integer(t, i) if isinstance(i, int) else i, integer(t, j) if isinstance(j, int) else j)
 
-    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
+    def blocks(self, P0: list[list[Fraction]], names: Sequence[str]) -> list[Block]:
         n = self.n
         U, D = udu([list(row) for row in P0])
         roots = [Fraction(0) if d == 0 else constant_root(d) for d in D]
@@ -52,8 +54,9 @@ class SqrtStore:
         for j in range(n):
             for i in range(j + 1):
                 values[self.packed(i, j)] = roots[j] * (1 if i == j else Fraction(U[i][j]))
-        doc = "lower triangular root by rows: P = S S^T"
-        return [Block("S", len(values), doc, initial=tuple(values))]
+        doc = "lower triangular root, P = S S^T: S_ij, i >= j, at i (i + 1) / 2 + j"
+        called = tuple(entry("s", names, n - 1 - i, n - 1 - j) for i in range(n) for j in range(i + 1))
+        return [Block("S", len(values), doc, initial=tuple(values), entries=called)]
 
     def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
         """The root in and out."""

@@ -24,6 +24,7 @@ from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.gather import GatheredFactors
 from kfgen.filters.covariance.loops.partly import FactorsInLoops
 from kfgen.filters.covariance.motion import VectorGain
+from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
 from kfgen.filters.covariance.parts import Columns, Gatherer, Gathering, Motion, Scalar
 from kfgen.filters.covariance.sqrt.store import SqrtStore
@@ -219,7 +220,7 @@ class StraightSqrt(StraightLine, SqrtStore):
     def store(self, t: Trace, P: Rows, names: list[str], after_predict: bool) -> None:
         for i in reversed(range(self.n)):
             for j in reversed(range(i, self.n)):
-                t.store("kf.S", self.packed(i, j), t.name(t.value(P[i][j]), f"s_{names[i]}_{names[j]}"))
+                t.store("kf.S", self.packed(i, j), t.name(t.value(P[i][j]), entry_next("s", names, i, j)))
 
 
 def _root(a: Number) -> tuple[Number, Number]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.numbers import assume_nonnegative, sqrt
 from kfgen.filters.algebra.triangles import strict_size, strict_start, upper_start
 from kfgen.filters.base import Block
+from kfgen.filters.covariance.names import entries, entry
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 
@@ -24,15 +25,17 @@ class UDStore:
         self.order = order
         self.n = len(order)
 
-    def blocks(self, P0: list[list[Fraction]]) -> list[Block]:
+    def blocks(self, P0: list[list[Fraction]], names: Sequence[str]) -> list[Block]:
         n = self.n
         U, D = udu([list(row) for row in P0])
         flat = tuple(Fraction(U[i][j]) for j in range(n) for i in range(j))
         out = []
         if n > 1:
-            out.append(Block("U", strict_size(n), "unit upper triangular factor, strict upper triangle by columns",
-                             initial=flat))  # fmt: skip
-        out.append(Block("D", n, "diagonal factor: P = U D U^T", initial=tuple(Fraction(d) for d in D)))
+            doc = "unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i"
+            called = entries("u", names, diagonal=False)
+            out.append(Block("U", strict_size(n), doc, initial=flat, entries=called))
+        out.append(Block("D", n, "diagonal factor: P = U D U^T", initial=tuple(Fraction(d) for d in D),
+                         entries=tuple(entry("d", names, i) for i in range(n))))  # fmt: skip
         return out
 
     def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:

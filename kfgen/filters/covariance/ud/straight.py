@@ -14,6 +14,7 @@ from kfgen.filters.algebra.triangles import strict
 from kfgen.filters.covariance.gather import GatheredFactors
 from kfgen.filters.covariance.loops.partly import FactorsInLoops
 from kfgen.filters.covariance.motion import VectorGain
+from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
 from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Scalar
 from kfgen.filters.covariance.straight import StraightLine
@@ -146,9 +147,9 @@ class StraightUD(StraightLine, UDStore):
         U, D = P
         for j in range(self.n):
             for i in range(j):
-                t.store("kf.U", strict(i, j), t.name(t.value(U[i][j]), f"u_{names[i]}_{names[j]}"))
+                t.store("kf.U", strict(i, j), t.name(t.value(U[i][j]), entry_next("u", names, i, j)))
         for j in range(self.n):
-            t.store("kf.D", j, t.name(t.value(D[j]), f"d_{names[j]}"))
+            t.store("kf.D", j, t.name(t.value(D[j]), entry_next("d", names, j)))
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Factors:
         return U, D
