@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 import sympy
 
 from kfgen.errors import Mistake, SpecError
+from kfgen.filters import kinds, sigma
 from kfgen.filters.algebra.numbers import is_zero
 from kfgen.filters.bank.imm import Imm
 from kfgen.filters.base import FilterCode
 from kfgen.filters.choice import choose, told, with_privates
 from kfgen.filters.covariance.base import Form
-from kfgen.filters.covariance.full.loops import LoopedFull
-from kfgen.filters.covariance.full.straight import StraightFull
+from kfgen.filters.covariance.forms import Choice, looped, straight
 from kfgen.filters.covariance.kernels.function import Kernels
 from kfgen.filters.covariance.loops.looped import Looping
 from kfgen.filters.covariance.parts import GainChange
-from kfgen.filters.covariance.sqrt.loops import LoopedSqrt
-from kfgen.filters.covariance.sqrt.straight import StraightSqrt
-from kfgen.filters.covariance.ud.loops import LoopedUD
-from kfgen.filters.covariance.ud.straight import StraightUD
 from kfgen.filters.frame.shared import unused
-from kfgen.filters.kinds.ekf import Ekf
-from kfgen.filters.kinds.ekf2 import Ekf2
-from kfgen.filters.kinds.iekf import Iekf
 from kfgen.filters.kinds.single import SingleFilter
 from kfgen.filters.kinds.steady import Steady
 from kfgen.filters.order import best_order
-from kfgen.filters.sigma.ukf import SequentialUkf, Ukf
 from kfgen.filters.steps import process
 from kfgen.filters.steps.sensor import SensorCode
 from kfgen.ir.nodes import Constants, Table
@@ -41,11 +36,15 @@ from kfgen.model.bank import build_bank
 from kfgen.scalars import Scalar
 from kfgen.spec.types import Spec
 
-_FILTERS: dict[str, Callable[[Model, Any, Scalar], SingleFilter]] = {
-    "kf": Ekf, "ekf": Ekf, "iekf": Iekf, "ekf2": Ekf2, "ukf": Ukf, "sequential": SequentialUkf,
-}  # fmt: skip
 
-_IN_LOOPS: dict[str, Callable[[Any, Looping], Form[Any]]] = {"ud": LoopedUD, "full": LoopedFull, "sqrt": LoopedSqrt}
+@cache
+def filters() -> Mapping[str, Callable[[Model, Any, Scalar], SingleFilter]]:
+    """Filter type -> the filter: what the modules of `kinds` and `sigma` name in a table FILTERS."""
+    found: dict[str, Callable[[Model, Any, Scalar], SingleFilter]] = {}
+    for room in (kinds, sigma):
+        for module in sorted(iter_modules(room.__path__), key=lambda each: each.name):
+            found |= getattr(import_module(f"{room.__name__}.{module.name}"), "FILTERS", {})
+    return found
 
 
 def build_filter(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> FilterCode:
@@ -110,8 +109,7 @@ def _filter(model: Model, form: Form[Any], scalar: Scalar, unroll: str) -> Singl
     """The filter of one model. unroll: what is asked for, in place of the spec's."""
     spec = model.spec
     asked = replace(model, spec=replace(spec, code=replace(spec.code, unroll=unroll)))
-    make = _FILTERS["sequential" if spec.filter.sequential else spec.filter.type]
-    return make(asked, form, scalar)
+    return filters()["sequential" if spec.filter.sequential else spec.filter.type](asked, form, scalar)
 
 
 def _in_loops(
@@ -130,26 +128,21 @@ def _in_loops(
         names = [model.states[i] for i in form.order]
         table = (model.spec.name, f"reach_{modes[place]}" if modes else "reach")
         how = Looping(names, kernels, weighted, steps, table)
-        out.append(_IN_LOOPS[model.spec.filter.covariance](form, how))
+        out.append(looped(model.spec.filter.covariance, form, how))
     return out
 
 
 def _form(model: Model, scalar: Scalar, order: list[int] | None = None) -> Form[Any]:
-    """How the covariance is kept, and in which order of the states, where that is not given; straight-line code."""
+    """How the covariance is kept, in straight-line code. order: of the states inside, where that is given."""
     n, chosen = len(model.states), model.spec.filter
-    if chosen.covariance == "sqrt":
-        return StraightSqrt(n)
-    if chosen.type == "ukf":  # sigma points depend on the order
-        inner = list(range(n))
-        if chosen.covariance == "ud":
-            return StraightUD(inner, "bierman")
-        return StraightFull(n, "standard", scalar.epsilon, inner)
-    assert chosen.update is not None
-    if order is None:
-        order = _order((model,))
-    if chosen.covariance == "ud":
-        return StraightUD(order, chosen.update, _gain_change(model, order))
-    return StraightFull(n, chosen.update, scalar.epsilon, order, _gain_change(model, list(range(n))))
+
+    def ordered() -> list[int]:
+        if chosen.type == "ukf":  # sigma points depend on the order
+            return list(range(n))
+        return _order((model,)) if order is None else order
+
+    choice = Choice(n, chosen.update, scalar.epsilon, ordered, lambda inner: _gain_change(model, inner))
+    return straight(chosen.covariance, choice)
 
 
 def _gain_change(model: Model, order: list[int]) -> GainChange | None:

@@ -230,3 +230,6 @@ class Ekf(SingleFilter):
     def moved(self, u: Update, motion: Motion) -> list[Value]:
         """x after the update, in the spec's order, before bounds and wrapping."""
         return motion.state(u.x, self.model.states, self.covariance.place)
+
+
+FILTERS = {"kf": Ekf, "ekf": Ekf}

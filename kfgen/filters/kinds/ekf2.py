@@ -129,3 +129,6 @@ class _Product:
                 if not is_zero(x):
                     total = plus(total, times(x, other.entry(b, a)))
         return total
+
+
+FILTERS = {"ekf2": Ekf2}

@@ -48,3 +48,6 @@ class Iekf(Ekf):
         y = [t.value(plus(v, dot(h, moved))) for v, h in zip(linear.y, linear.H, strict=True)]
         innovation = self.innovation(u, replace(linear, y=y))
         return self.sequence(u, innovation, plain=False)
+
+
+FILTERS = {"iekf": Iekf}

@@ -184,3 +184,6 @@ class SequentialUkf(Ukf):
 
     def spread(self, u: Update, linear: Linearised) -> Symmetric:
         return super().spread(u, linear) if self.seeing[u.sensor.name].linear else self._spread
+
+
+FILTERS = {"ukf": Ukf, "sequential": SequentialUkf}
