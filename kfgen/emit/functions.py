@@ -17,7 +17,8 @@ from kfgen.scalars import Scalar
 
 
 class FunctionMaker:
-    """Makes the views of a filter's functions; `helpers` are the routines that those made so far call.
+    """Makes the views of a filter's functions; `helpers` are the routines that those made so far call, `costs` their
+    operations.
 
     tables: their names in the C. fixed: the scalar is fixed point, whose operations may saturate.
     """
@@ -31,6 +32,7 @@ class FunctionMaker:
         self.name = self.spec.name
         self.NAME = self.name.upper()
         self.helpers: set[str] = set()
+        self.costs: dict[str, str] = {}  # of the functions that run again and again
         self.entries = {
             (f"kf.{b.name}", i): Entry(name, b.points[i] if b.points else None)
             for b in code.blocks
@@ -47,7 +49,9 @@ class FunctionMaker:
         body = printer.statements(with_entries(f.body, self.entries, self.taken, self.name))
         self.helpers |= printer.helpers
         prototype = self._prototype(f)
-        cost = cost_of(f) if is_counted(f) else ""
+        if _is_counted(f):
+            self.costs[f.name] = _cost(f)
+        cost = self.costs.get(f.name)
         return FunctionView(
             name=f.name,
             arguments=tuple(a.name for a in f.arguments),
@@ -119,12 +123,12 @@ class FunctionMaker:
         return f"{text}, or an error that leaves *kf as it was"
 
 
-def is_counted(f: Function) -> bool:
+def _is_counted(f: Function) -> bool:
     """Whether the operations of a function are told: of those that run again and again."""
     return f.name == "predict" or f.name.startswith("update_")
 
 
-def cost_of(f: Function) -> str:
+def _cost(f: Function) -> str:
     """`12 add, 3 mul`; empty where loops leave them uncounted."""
     counts = operations(f.body)
     if counts is None:

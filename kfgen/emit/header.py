@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Protocol
 
 from kfgen.emit.data import Data, Named
-from kfgen.emit.functions import cost_of, is_counted
 from kfgen.emit.text import WIDTH, about, columns, fill, safe
 from kfgen.filters.base import FilterCode
 from kfgen.ir.nodes import Constants, Table
@@ -75,9 +74,9 @@ def state_table(code: FilterCode) -> list[str]:
     ])  # fmt: skip
 
 
-def cost_table(code: FilterCode) -> list[str]:
+def cost_table(costs: Mapping[str, str]) -> list[str]:
     """The operations of each function that runs again and again."""
-    return columns([[f.name, cost_of(f) or "loops"] for f in code.functions if is_counted(f)])
+    return columns([[name, cost or "loops"] for name, cost in costs.items()])
 
 
 def reference(code: FilterCode) -> Iterator[Data]:

@@ -60,7 +60,7 @@ def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPo
         states=header.indices(NAME, spec.states),
         state_table=tuple(header.state_table(code)),
         reference=tuple(reference),
-        cost_table=tuple(header.cost_table(code)),
+        cost_table=tuple(header.cost_table(maker.costs)),
         advice=code.notes,
         inputs=header.members(spec.inputs),
         sensors=tuple(SensorView(s.name, s.name.upper(), header.members(s.components)) for s in spec.measurements),

@@ -162,10 +162,12 @@ def roots(statement: Statement) -> list[Node]:
 def mapped(statement: Statement, new: Callable[[Node], Node]) -> Statement:
     """The statement with `new` of each node that it itself evaluates."""
     match statement:
-        case Let(node=node):
-            return replace(statement, node=new(node))
-        case Assign(index=index, node=node) | Store(index=index, node=node):
-            return replace(statement, index=None if index is None else new(index), node=new(node))
+        case Let(node=node, name=name, point=point):
+            return Let(new(node), name, point)
+        case Store(name=name, index=index, node=node):
+            return Store(name, None if index is None else new(index), new(node))
+        case Assign(name=name, index=index, node=node):
+            return Assign(name, None if index is None else new(index), new(node))
         case Declare(value=value):
             return replace(statement, value=None if value is None else new(value))
         case Guard(condition=condition, before=before):

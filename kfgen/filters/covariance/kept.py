@@ -27,7 +27,7 @@ class Kept:
         self.initial = initial
         self.factored = factored
         self.names = names
-        self.doc = doc + f": {'U above D' if factored else 'entries'} i <= j at j (j + 1) / 2 + i"
+        self.doc = doc + f"{', U above D' if factored else ''}: (i, j), i <= j, at j (j + 1) / 2 + i"
 
     def block(self) -> Block:
         matrix: Rows = self.initial
