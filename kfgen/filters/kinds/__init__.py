@@ -1,1 +1,1 @@
-"""The filters that linearise: each reads as its book page. A module with a table FILTERS is all that a new one takes."""
+"""The filters that linearise, each as its book page; a module with a table FILTERS is all that a new one takes."""
