@@ -94,14 +94,17 @@ class Pool:
     def make(self, op: str, args: tuple[Node, ...] = (), data: Any = None, kind: str = REAL,
              volatile: bool = False) -> Node:  # fmt: skip
         """The node of an operation as it stands, without folding; equal ones are one."""
-        volatile = volatile or any(a.volatile for a in args)
-        key = (op, tuple(a.serial for a in args), data, kind)
+        key = (op, args, data, kind)
         found = self._nodes.get(key)
         if found is None:
-            found = Node(op, args, data, kind, self._count, volatile)
+            volatile = volatile or any(a.volatile for a in args)
+            found = self._nodes[key] = Node(op, args, data, kind, self._count, volatile)
             self._count += 1
-            self._nodes[key] = found
+            self._was_made(key, found)
         return found
+
+    def _was_made(self, key: tuple[Any, ...], node: Node) -> None:
+        """Called for every new node. key: by which it is found again."""
 
     def fresh(self, op: str, args: tuple[Node, ...], data: Any, kind: str) -> Node:
         """A volatile read: never the same node twice, for what it reads may have changed."""
@@ -151,7 +154,7 @@ class Pool:
             return self.neg(self.add(a.args[0], b))
         if cb is not None and cb < 0:
             return self.add(a, self.make("const", (), -cb, a.kind))
-        opposite = self._nodes.get(("sub", (b.serial, a.serial), None, a.kind))
+        opposite = self._nodes.get(("sub", (b, a), None, a.kind))
         return self.neg(opposite) if opposite is not None else self.make("sub", (a, b), kind=a.kind)
 
     def neg(self, a: Node) -> Node:
@@ -197,7 +200,7 @@ class Pool:
         return self.make("div", (a, b))
 
     def _commutative(self, op: str, a: Node, b: Node) -> Node:
-        if (op, (b.serial, a.serial), None, a.kind) in self._nodes:
+        if (op, (b, a), None, a.kind) in self._nodes:
             a, b = b, a
         return self.make(op, (a, b), kind=a.kind)
 

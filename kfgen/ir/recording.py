@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
-from kfgen.ir.nodes import REAL, Node, Pool
+from kfgen.ir.nodes import Node, Pool
 from kfgen.ir.program import Statement
 
 
@@ -20,17 +21,13 @@ class RecordingPool(Pool):
 
     def __init__(self) -> None:
         self.block = Block()
-        self._made: list[tuple[object, ...]] = []
+        self._made: list[tuple[Any, ...]] = []
         super().__init__()
 
-    def make(self, op: str, args: tuple[Node, ...] = (), data: object = None, kind: str = REAL,
-             volatile: bool = False) -> Node:  # fmt: skip
-        before = self._count
-        node = super().make(op, args, data, kind, volatile)
-        if self._count != before and op != "const":
+    def _was_made(self, key: tuple[Any, ...], node: Node) -> None:
+        if node.op != "const":
             self.block.items.append(node)
-            self._made.append((op, tuple(a.serial for a in args), data, kind))
-        return node
+            self._made.append(key)
 
     def fresh(self, op: str, args: tuple[Node, ...], data: object, kind: str) -> Node:
         node = super().fresh(op, args, data, kind)
