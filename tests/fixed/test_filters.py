@@ -253,3 +253,14 @@ def test_extreme_arguments_are_followed(what, sign):
         ref.update("pos", z)
     assert flags == Status.SATURATED  # nis, at least
     assert np.max(np.abs(kf.x - ref.x) / np.sqrt(np.diag(ref.P))) < 0.02
+
+
+def test_adapted_covariances_of_sensors_of_different_sizes() -> None:
+    text = BALL.replace("filter: {type: ekf, covariance: full, update: standard}", """  three:
+    z: {a: {h: s, var: 1}, b: {h: v, var: 1}, c: {h: s + v, var: 1}}
+  one: {z: {a: {h: v, var: 1}}}
+filter: {type: ekf, covariance: full, update: standard, adapt_R: 0.001}""")
+    kf = native.compile(loads(text))
+    assert {name: R.shape for name, R in kf.R.items()} == {"pos": (1, 1), "three": (3, 3), "one": (1, 1)}
+    kf.predict()
+    assert kf.update("three", [0.1, 0.2, 0.3]) == Status.OK

@@ -31,5 +31,6 @@ def blank(code: FilterCode) -> Memory:
     for f in code.functions:
         for a in f.arguments:
             if a.size is not None and not f.private:
-                memory.arrays[a.name] = [0.0] * max(a.size, n)
+                # functions may share a name: get_R_<sensor> of sensors of different sizes
+                memory.arrays[a.name] = [0.0] * max(a.size, n, len(memory.arrays.get(a.name, ())))
     return memory
