@@ -38,13 +38,7 @@ def udu(P: Rows) -> tuple[Rows, Vector]:
         if not is_positive(D[j]):
             for i in range(j):
                 require_no_column(D[j], P[i][j], scale[i], scale[j])
-        inverse = 1 / D[j] if is_positive(D[j]) else reciprocal(D[j])[1]
-        for i in range(j):
-            U[i][j] = times(P[i][j], inverse)
-        for i in range(j):
-            for k in range(i + 1):
-                if not is_zero(U[i][j]) and not is_zero(P[k][j]):
-                    P[k][i] = P[k][i] - U[i][j] * P[k][j]
+        _eliminate(P, U, D, j)
     return U, D
 
 
@@ -60,14 +54,19 @@ def udu_computed(P: Rows, smallest: Number) -> tuple[Rows, Vector]:
             continue
         least = scale[j] * smallest
         D[j] = assume_nonnegative(P[j][j] if j == n - 1 else select(P[j][j] > least, P[j][j], least))
-        inverse = 1 / D[j] if is_positive(D[j]) else reciprocal(D[j])[1]
-        for i in range(j):
-            U[i][j] = times(P[i][j], inverse)
-        for i in range(j):
-            for k in range(i + 1):
-                if not is_zero(U[i][j]) and not is_zero(P[k][j]):
-                    P[k][i] = P[k][i] - U[i][j] * P[k][j]
+        _eliminate(P, U, D, j)
     return U, D
+
+
+def _eliminate(P: Rows, U: Rows, D: Vector, j: int) -> None:
+    """Column j of U from that of P, which is what D_j leaves of the matrix; P less its outer product."""
+    inverse = 1 / D[j] if is_positive(D[j]) else reciprocal(D[j])[1]
+    for i in range(j):
+        U[i][j] = times(P[i][j], inverse)
+    for i in range(j):
+        for k in range(i + 1):
+            if not is_zero(U[i][j]) and not is_zero(P[k][j]):
+                P[k][i] = P[k][i] - U[i][j] * P[k][j]
 
 
 def gram_schmidt(rows: Rows, weights: Vector) -> tuple[Rows, Vector]:
