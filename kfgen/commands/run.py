@@ -75,7 +75,8 @@ def columns(spec: Spec, result: RunResult) -> dict[str, NDArray[np.generic]]:
     own = np.float32 if spec.scalar == FLOAT else np.float64  # so that they print as short as they are
     out: dict[str, NDArray[np.generic]] = {"t": result.t}
     names = [state.name for state in spec.states]
-    out |= {f"x.{name}": result.x[:, i].astype(own) for i, name in enumerate(names)}
+    wide = spec.code.compensated
+    out |= {f"x.{name}": result.x[:, i].astype(np.float64 if name in wide else own) for i, name in enumerate(names)}
     out |= {f"var.{name}": result.var[:, i].astype(own) for i, name in enumerate(names)}
     out |= {f"nis.{name}": nis.astype(own) for name, nis in result.nis.items()}
     out["status"] = result.status

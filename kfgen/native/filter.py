@@ -103,8 +103,11 @@ class NativeFilter:
 
     @property
     def x(self) -> Array:
-        """The state [n]."""
-        return self.struct.value.to_physical(self.struct.field("x"), self.struct.units.x)
+        """The state [n]; with what rounding has left of compensated ones."""
+        x = self.struct.value.to_physical(self.struct.field("x"), self.struct.units.x)
+        if self.struct.compensated:
+            x[list(self.struct.compensated)] += self.struct.field("x_rest").astype(np.float64)
+        return x
 
     @property
     def P(self) -> Array:

@@ -129,6 +129,7 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         "mask": work.mask.copy(),
         "z": scalar.to_raw(work.z, units.readings),
         "x": np.zeros((rows, n), scalar.dtype),
+        "rest": np.zeros((rows, len(struct.compensated)), scalar.dtype),
         "var": np.zeros((rows, n), scalar.dtype),
         "nis": np.zeros((rows, sensors), scalar.dtype),
         "mu": np.zeros((rows, modes), scalar.dtype),
@@ -142,9 +143,11 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
     status: NDArray[np.uint32] = arrays["status"]
     updated = (arrays["mask"] != 0) & (status[:, 1:] < ERROR)
     functions = ["predict", *(f"update_{name}" for name in units.z)]
+    x = scalar.to_physical(arrays["x"], units.x)
+    x[:, list(struct.compensated)] += arrays["rest"].astype(np.float64)
     return RunResult(
         t=work.t,
-        x=scalar.to_physical(arrays["x"], units.x),
+        x=x,
         var=scalar.to_physical(arrays["var"], np.diag(units.P))
         if struct.has("get_covariance")
         else np.full((rows, n), np.nan),

@@ -18,7 +18,8 @@ class Struct:
     """One filter's struct.
 
     declared: what its header declares. ffi, lib: cffi's. data: the pointer to the struct. fields: the names of
-    its fields. value, units: how its numbers become physical ones.
+    its fields. compensated: the states that have a second word, x_rest. value, units: how its numbers become
+    physical ones.
     """
 
     def __init__(self, spec: Spec, declared: Declarations, ffi: Any, lib: Any) -> None:
@@ -29,6 +30,7 @@ class Struct:
         self.value: Value = value_of(declared)
         self.units = Units(spec, self.value)
         self.data = ffi.new(f"{spec.name}_t *")
+        self.compensated = tuple(i for i, s in enumerate(spec.states) if s.name in spec.code.compensated)
         self.fields = {name for name, _ in ffi.typeof(f"{spec.name}_t").fields}
 
     def copy(self) -> Struct:

@@ -257,5 +257,12 @@ CODE = Record(
         Key("stack", Budget(), "Bytes of stack, likewise."),
         Key("log_likelihood", Flag(), "Keep the log-likelihood of the last update.", "false"),
         Key("gate_count", Flag(), "Keep the number of rejections in a row, per sensor.", "false"),
+        Key(
+            "compensated",
+            Either(scalar=Flag(), sequence=Items(Reference("state"), "states")),
+            "Carry on in a second word, `x_rest`, what rounding leaves of all states, or of those listed: for states "
+            "that are large beside their steps, such as a position on the earth in float. With kf, ekf, iekf, ekf2.",
+            "false",
+        ),
     ),
 )

@@ -208,6 +208,7 @@ class Code:
     stack: int | None = None
     log_likelihood: bool = False
     gate_count: bool = False
+    compensated: tuple[str, ...] = ()  # states
     places: Mapping[str, Place] = field(default_factory=dict)
 
 

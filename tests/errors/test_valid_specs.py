@@ -38,6 +38,7 @@ def test_vehicle() -> None:
     assert spec.filter.robust is not None
     assert spec.filter.robust.influence == "custom"
     assert spec.code.flash == 16 * 1024
+    assert spec.code.compensated == ("px", "py")
     assert spec.code.stack == 512
     assert spec.measurements[0].gate is not None
     assert spec.measurements[0].gate.reset_after == 5

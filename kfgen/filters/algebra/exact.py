@@ -63,6 +63,16 @@ class Linear:
             out.append(total)
         return out
 
+    def step(self, i: int, at: Evaluator, given: dict[str, Dual]) -> Value:
+        """By what state i moves, once `advance` has bound the step."""
+        total: Value = at.trace.zero
+        for j, name in enumerate(self.model.states):
+            factor = self.Phi[i, j] - (1 if i == j else 0)
+            for weight, term in ((factor, given[name].value), (self.Gamma[i, j], at.value(self.b[j]))):
+                if weight != 0:
+                    total = total + at.value(weight) * term
+        return total
+
     def noise(self, t: Trace, at: Evaluator, Qc: Rows, dt: Value) -> tuple[Rows, list[tuple[Vector, Value]]]:
         """The densities over the step: a constant matrix (n, n), or columns (w, d) whose sum of d w w^T it is."""
         n = len(self.b)

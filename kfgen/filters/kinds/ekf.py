@@ -21,6 +21,7 @@ from kfgen.filters.frame import guards
 from kfgen.filters.kinds.single import SingleFilter
 from kfgen.filters.steps import process
 from kfgen.filters.steps.adapt import AdaptedR
+from kfgen.filters.steps.compensation import Rests
 from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.process import Advance, Prior, Step
 from kfgen.filters.steps.sensor import Innovation, Linearised, SensorCode, decorrelated, masked, total
@@ -44,6 +45,8 @@ class Update:
     used: list[Value] | None
     adapted: AdaptedR | None
     tested: list[Value] = field(default_factory=list)  # what else has to be finite
+    rests: Rests = field(default_factory=dict)  # of compensated states, after the update
+    free: list[Value] = field(default_factory=list)  # x after the update, before bounds
 
     @cached_property
     def P(self) -> Any:
@@ -79,13 +82,15 @@ class Ekf(SingleFilter):
         for row_name, row in zip(self.names, F, strict=True):
             for name, value in zip(self.names, row, strict=True):
                 t.name(value, f"f_{row_name}_{name}")
-        x = [t.name(value, f"{name}_next") for value, name in zip(result.x, model.states, strict=True)]
+        compensated, rests = self.compensation.moved(t, prior.x, result.steps)
+        x = [compensated[i] if i in rests else t.name(value, f"{name}_next")
+             for i, (value, name) in enumerate(zip(result.x, model.states, strict=True))]  # fmt: skip
         P0 = self.form.load(t)
         x = self.form.kept(t, x, prior.x)
         P = self.form.predict(t, P0, F, self.additive(t, result), noise)
         evidence = self.unconfined(x) + self.form.evidence(P, after_predict=True)
         P = self.limited(t, P)
-        x = self.state.confined(t, x)
+        free, x = x, self.state.confined(t, x)
         moved = {i for i, (value, before) in enumerate(zip(x, prior.x, strict=True)) if value.node is not before.node}
         t.section("guards")
         values = [v for rows in (F, result.Q) for row in rows for v in row]
@@ -93,6 +98,7 @@ class Ekf(SingleFilter):
         guards.finite(t, [x[i] for i in sorted(moved)] + evidence)
         yield Made(x, P)
         self.store(t, x, moved if t.in_place else set(range(len(x))), P, after_predict=True)
+        self.compensation.store(t, rests, free, x)
 
     def advance(self, t: Trace, prior: Prior, step: Step) -> Advance:
         """The model's step from the prior, in the spec's order."""
@@ -112,7 +118,7 @@ class Ekf(SingleFilter):
         t.section("innovation")
         code = SensorCode(t, self.model, sensor, self.order, self.derivatives, self.skipped(sensor))
         u = Update(t, sensor, code, code.prior(), self.form, used, self.adapted_R(sensor))
-        linear = self.linearise(u)
+        linear = self.compensation.corrected(t, self.linearise(u), self.order)
         innovation = self.innovation(u, linear)
         result = self.sequence(u, innovation, plain=True)
         final = yield from self.final(u, innovation, result)
@@ -120,7 +126,7 @@ class Ekf(SingleFilter):
         inflates = self.model.options.inflation is not None and not self.form.factored
         evidence = self.unconfined(x) + self.form.evidence(final.P, after_predict=inflates)
         P = self.limited(t, final.P)
-        x = self.state.confined(t, x)
+        u.free, x = x, self.state.confined(t, x)
         t.section("guards")
         if final is result and sensor.gate is None:
             guards.doubts(t, [*self._model_values(innovation), *u.tested])
@@ -214,6 +220,7 @@ class Ekf(SingleFilter):
         if learnt.Q is not None and learnt.Q.early:
             learnt.Q.store()
         self.store(u.t, x, set(range(len(x))), P, after_predict=False)
+        self.compensation.store(u.t, u.rests, u.free, x)
         if u.adapted is not None:
             u.adapted.store(u.t, learnt.residual, u.used)
         if learnt.Q is not None and not learnt.Q.early:
@@ -229,7 +236,11 @@ class Ekf(SingleFilter):
 
     def moved(self, u: Update, motion: Motion) -> list[Value]:
         """x after the update, in the spec's order, before bounds and wrapping."""
-        return motion.state(u.x, self.model.states, self.covariance.place)
+        x = motion.state(u.x, self.model.states, self.covariance.place)
+        dx = motion.entries() if self.compensation.states else []
+        steps = {i: u.t.value(dx[self.order.index(i)]) for i in self.compensation.states}
+        compensated, u.rests = self.compensation.moved(u.t, u.x, steps)
+        return [compensated[i] if i in u.rests else value for i, value in enumerate(x)]
 
 
 FILTERS = {"kf": Ekf, "ekf": Ekf}

@@ -16,6 +16,7 @@ from kfgen.filters.algebra.numbers import Number, is_nonnegative, is_zero
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.noise import Additive, Computed, Given
 from kfgen.filters.kinds.ekf import Ekf, Update
+from kfgen.filters.steps.compensation import with_means
 from kfgen.filters.steps.process import Advance, Prior, Step
 from kfgen.filters.steps.sensor import Linearised
 from kfgen.ir.trace import Trace, Value
@@ -40,7 +41,8 @@ class Ekf2(Ekf):
         terms = self._terms(t, result.after, self.form.entries(self.form.load(t)), noises, Qw)
         Given([[result.Q[i][j] for j in self.order] for i in self.order]).entries()  # tested before the rest comes in
         Q = [[q + t.value(g) for q, g in zip(a, b, strict=True)] for a, b in zip(result.Q, terms.spread, strict=True)]
-        return replace(result, x=[a + m for a, m in zip(result.x, terms.mean, strict=True)], Q=Q)
+        x = [a + m for a, m in zip(result.x, terms.mean, strict=True)]
+        return replace(result, x=x, Q=Q, steps=with_means(result.steps, terms.mean))
 
     def additive(self, t: Trace, result: Advance) -> Additive:
         if self.Q is not None or not any(d.hessian for d in result.after):

@@ -44,7 +44,10 @@ class Iekf(Ekf):
             if not part.flat:
                 moved[place] = part.local(x[i], u.x[i])
             t.name(x[i], f"{model.states[i]}_iterate")
-        linear = u.code.linearise(x)
+        steps = {i: t.value(moved[self.order.index(i)]) for i in self.compensation.states}
+        compensated, rests = self.compensation.moved(t, u.x, steps)
+        x = [compensated[i] if i in rests else value for i, value in enumerate(x)]
+        linear = self.compensation.corrected(t, u.code.linearise(x), self.order, rests)
         y = [t.value(plus(v, dot(h, moved))) for v, h in zip(linear.y, linear.H, strict=True)]
         innovation = self.innovation(u, replace(linear, y=y))
         return self.sequence(u, innovation, plain=False)

@@ -10,6 +10,7 @@ from kfgen.filters.covariance.base import Form
 from kfgen.filters.frame.runs import put
 from kfgen.filters.steps import process
 from kfgen.filters.steps.adapt import AdaptedQ, AdaptedR
+from kfgen.filters.steps.compensation import Compensation
 from kfgen.filters.steps.covariance import CovarianceCode, get_matrix
 from kfgen.filters.steps.gate import gate, store_outcome
 from kfgen.filters.steps.phases import Judged, Phases, begin_predict, begin_update, predict_doc, update_name
@@ -48,7 +49,8 @@ class SingleFilter(ABC):
         for sensor in model.sensors:
             adapted = self.adapted_R(sensor)
             extra += [] if adapted is None else adapted.blocks()
-        extra = form.named([*extra, *self.extra_blocks()])
+        self.compensation = Compensation(model)
+        extra = [*self.compensation.blocks(), *form.named([*extra, *self.extra_blocks()])]
         outdated = (self.outdated,) if self.outdated else ()
         self.covariance = CovarianceCode(model, form, scalar.epsilon, self.outdated)
         self.state = StateCode(model, self.covariance.blocks(), tuple(extra), outdated)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
@@ -15,6 +15,11 @@ from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 
 NEGATIVE = "a noise variance is negative"
+
+
+def compensated(model: Model) -> tuple[int, ...]:
+    """The states whose rounding is carried on: see `compensation`."""
+    return tuple(i for i, name in enumerate(model.states) if name in model.spec.code.compensated)
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,8 @@ class Prior:
 class Advance:
     """x (n), F (n, n), Q (n, n) and the noise columns (w, d): P <- F P F^T + Q + sum d w w^T. Spec's order.
 
-    after: x with its derivatives. added: what of Q comes from noise densities.
+    after: x with its derivatives. added: what of Q comes from noise densities. steps: by what x moves, of those states
+    of which that is asked for.
     """
 
     x: list[Value]
@@ -46,6 +52,7 @@ class Advance:
     noise: list[tuple[Vector, Value]]
     after: list[Dual]
     added: Rows | None = None
+    steps: dict[int, Value] = field(default_factory=dict)
 
 
 def step_length(t: Trace, model: Model) -> Step:
@@ -123,22 +130,25 @@ def advance(
     Qw = [[at_prior.value(e) for e in row] for row in model.noise_covariance]
     if model.spec.dynamics.form == "discrete":
         after = [at_prior(e) for e in model.f]
+        steps = {i: at_prior.value(model.f[i] - model.symbols[model.states[i]]) for i in compensated(model)}
     else:
         assert step.dt is not None
         if model.spec.dynamics.integrator == "exact":
             linear = discretise(model)
             after = linear.advance(t, at_prior, prior.duals, step.dt)
+            steps = {i: linear.step(i, at_prior, prior.duals) for i in compensated(model)}
             index = [i for i, w in enumerate(model.noises) if w.density]
             added, extra = linear.noise(t, at_prior, [[Qw[i][j] for j in index] for i in index], step.dt)
             Q = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(Q, added, strict=True)]
         else:
-            after = _integrate(t, model, prior, step.dt, held, derivatives)
+            after, moved_by = _integrate(t, model, prior, step.dt, held, derivatives)
+            steps = {i: moved_by[i].value for i in compensated(model)}
             rates = [at_prior(e) for e in model.f]
             extra = _columns(t, model, rates, dense, Qw, step.dt)
     F = [[d.gradient.get(name, t.zero) for name in model.states] for d in after]
     noise = _columns(t, model, after, [w for w in held if w not in carried], Qw, None) + extra
     assert len(F) == n
-    return Advance([d.value for d in after], F, Q, noise, after, added)
+    return Advance([d.value for d in after], F, Q, noise, after, added, steps)
 
 
 def moved(t: Trace, model: Model, duals: dict[str, Dual], dt: Value | None) -> list[Value]:
@@ -151,7 +161,7 @@ def moved(t: Trace, model: Model, duals: dict[str, Dual], dt: Value | None) -> l
     if model.spec.dynamics.integrator == "exact":
         after = discretise(model).advance(t, Evaluator(t, model, duals), duals, dt)
     else:
-        after = _integrate(t, model, prior, dt, [w.name for w in model.noises if not w.density], 1)
+        after, _ = _integrate(t, model, prior, dt, [w.name for w in model.noises if not w.density], 1)
     return [d.value for d in after]
 
 
@@ -187,8 +197,9 @@ def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Ro
 
 def _integrate(
     t: Trace, model: Model, prior: Prior, dt: Value, held: list[str], derivatives: int
-) -> list[Dual]:
-    """euler, midpoint or rk4 with substeps; t, dt, inputs and noises are held over the step.
+) -> tuple[list[Dual], list[Dual]]:
+    """euler, midpoint or rk4 with substeps; t, dt, inputs and noises are held over the step. Where x is then, and by
+    what it has moved.
 
     Derivatives are carried through the stages, so F and G are those of the integrator itself.
     """
@@ -208,19 +219,23 @@ def _integrate(
         return [a + b.scaled(length) if i in moving else a for i, (a, b) in enumerate(zip(x, k, strict=True))]
 
     x = [prior.duals[name] for name in model.states]
+    whole = [Dual(t.zero) for _ in x]
     for _ in range(dynamics.substeps):
         k1 = rate(x)
         if dynamics.integrator == "euler":
-            x = shifted(x, k1, h)
+            k, part = k1, h
         elif dynamics.integrator == "midpoint":
-            x = shifted(x, rate(shifted(x, k1, h * Fraction(1, 2))), h)
+            k, part = rate(shifted(x, k1, h * Fraction(1, 2))), h
         else:
             k2 = rate(shifted(x, k1, h * Fraction(1, 2)))
             k3 = rate(shifted(x, k2, h * Fraction(1, 2)))
             k4 = rate(shifted(x, k3, h))
-            total = [a + (b + c).scaled(2) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
-            x = shifted(x, total, h * Fraction(1, 6))
-    return x
+            k = [a + (b + c).scaled(2) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+            part = h * Fraction(1, 6)
+        x = shifted(x, k, part)
+        if compensated(model):
+            whole = shifted(whole, k, part)
+    return x, whole
 
 
 def store_time(t: Trace, model: Model, step: Step) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from kfgen.filters.algebra.numbers import select
 from kfgen.filters.base import KF, Block
 from kfgen.filters.frame.runs import put
+from kfgen.filters.steps.compensation import FIELD, Compensation
 from kfgen.ir.program import Argument, Function, Store
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace, Value
@@ -105,6 +106,8 @@ class StateCode:
         stores.append(Store("kf.nis", None, t.pool.zero))
         stores.append(Store("kf.initialized", None, t.pool.boolean(True)))
         stores += [Store(path, None, t.pool.boolean(False)) for path in self.outdated]
+        second = Compensation(self.model).place
+        stores += [Store(f"kf.{FIELD}", t.pool.integer(second[i]), t.pool.zero) for i in set_here if i in second]
         t.guard(~done, "OK", before=stores)
 
     # functions ---------------------------------------------------------------------------------------
@@ -143,6 +146,7 @@ class StateCode:
                 t.store(path, i, value)
         for path in self.outdated:
             t.store(path, None, t.wrapped(t.pool.boolean(False)))
+        Compensation(self.model).clear(t)
         argument = Argument("x", "{name}_real_t", pointer=True, size=self.n, doc="new state")
         return Function(
             "set_state",

@@ -117,6 +117,13 @@ class Builder:
         by_state = dict(entries(scale)) if isinstance(scale, Fields) else None
         return Fixed(by_state, f.get("rounding", "nearest"), f.get("overflow", "saturate"))
 
+    def compensated(self, written: object) -> tuple[str, ...]:
+        if isinstance(written, bool):
+            states = self.top.get("states")
+            return tuple(name for name, _ in entries(states)) if written and isinstance(states, Fields) else ()
+        words = written if isinstance(written, list | tuple) else ()
+        return tuple(word.text for word in words if isinstance(word, Word))
+
     def code(self) -> Code:
         f = self.top.get("code")
         if not isinstance(f, Fields):
@@ -128,5 +135,6 @@ class Builder:
             self.values.number(f.get("stack")),
             f.get("log_likelihood", False),
             f.get("gate_count", False),
+            self.compensated(f.get("compensated", False)),
             dict(f.places),
         )
