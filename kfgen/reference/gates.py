@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from scipy.stats import chi2
-
+from kfgen.reference.chi2 import chi2_quantile
 from kfgen.reference.model import Model
 from kfgen.reference.sensor import Reading
 from kfgen.reference.status import Status
@@ -34,5 +33,5 @@ class Gates:
         """The chi-square quantile of a sensor's gate with so many components."""
         key = (sensor, used)
         if key not in self._thresholds:
-            self._thresholds[key] = float(chi2.ppf(self._gates[sensor][1], used))
+            self._thresholds[key] = chi2_quantile(self._gates[sensor][1], used)
         return self._thresholds[key]

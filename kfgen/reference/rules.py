@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from scipy.stats import chi2
-
+from kfgen.reference.chi2 import chi2_quantile
 from kfgen.reference.influence import influence
 from kfgen.reference.joseph import PLAIN, Rules
 from kfgen.reference.model import Context, Model
@@ -47,4 +46,4 @@ def _threshold(model: Model, adaptive: Adaptive, robust: bool) -> float:
     if adaptive.chi2 is not None:
         return model.number(adaptive.chi2)
     default = _ROBUST if robust else _ALONE
-    return float(chi2.ppf(default if adaptive.probability is None else model.number(adaptive.probability), 1))
+    return chi2_quantile(default if adaptive.probability is None else model.number(adaptive.probability), 1)

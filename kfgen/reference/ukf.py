@@ -11,10 +11,10 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from kfgen.reference.algorithm import Algorithm, Correction, Estimate, Innovation
 from kfgen.reference.carried import carried_by_process
+from kfgen.reference.chi2 import chi2_quantile
 from kfgen.reference.cloud import Cloud, Drawing, average, centre, magnitude, wrapped
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.joseph import update
@@ -235,4 +235,4 @@ def _threshold(model: Model, adaptive: Adaptive, dimensions: int) -> float:
     if adaptive.chi2 is not None:
         return model.number(adaptive.chi2)
     probability = 0.999 if adaptive.probability is None else model.number(adaptive.probability)
-    return float(chi2.ppf(probability, dimensions))
+    return chi2_quantile(probability, dimensions)
