@@ -159,5 +159,5 @@ class Expressions:
 
 
 def _counts(node: Node) -> bool:
-    """Whether it is a counter in the struct, which is unsigned; what is added to it or it is held against is a constant."""
+    """Whether it is a counter in the struct, which is unsigned and meets nothing but constants."""
     return node.op == "field" and node.kind == "int" and str(node.data).startswith("kf.")

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,14 +45,14 @@ class Work:
     mend: Mapping[str, tuple[str, str]] | None = None
 
 
-class TooSlow(Exception):
+class TooSlowError(Exception):
     """A spec takes longer than LONGEST."""
 
 
 @contextmanager
 def _limited(seconds: int) -> Iterator[None]:
     def late(*_: Any) -> None:
-        raise TooSlow
+        raise TooSlowError
 
     before = signal.signal(signal.SIGALRM, late)
     signal.alarm(seconds)
@@ -87,7 +88,7 @@ def work(batch: int, how: Work, seen: frozenset[str] = frozenset()) -> Result:
         except KfgenError as error:
             counts["refused"] += 1
             refused[_short(error)] += 1
-        except TooSlow:
+        except TooSlowError:
             _fail(result, kinds, f"build takes more than {LONGEST} s", seed, data)
         except Exception:
             told = traceback.format_exc(limit=-3)
@@ -110,7 +111,9 @@ def _plain(kinds: Counter[str]) -> Counter[str]:
     return Counter(key.partition("\0")[0] for key in kinds)
 
 
-def _fail(result: Result, kinds: Counter[str], kind: str, seed: int, data: Data, calls: str = "", where: str = "") -> None:
+def _fail(
+    result: Result, kinds: Counter[str], kind: str, seed: int, data: Data, calls: str = "", where: str = ""
+) -> None:
     kinds[f"{kind}\0{seed}"] += 1
     result.failures.append(Failure(kind, seed, data, where, calls))
 
@@ -128,7 +131,7 @@ def _called(
     if not made:
         return
     program = compile_batch(folder, made, _mended(made, how))
-    for index, (generated, data) in enumerate(made.values()):
+    for index, (_, data) in enumerate(made.values()):
         seed = int(data["name"][1:])
         told = run(program, index, 0, how.segments, how.seconds)
         counts.update(calls=told.calls, ok=told.ok, warned=told.warned, refused_calls=told.refused)
@@ -139,7 +142,7 @@ def _called(
                 continue
             small, calls, place = data, "", ""
             if segment == first:  # the rest of what a spec shows is likely to have the same cause
-                small = minimised(data, lambda d, k=kind: k in _hostile_kinds(d, how, first), _left(how))
+                small = minimised(data, partial(_fails, kind, how, first), _left(how))
                 calls, place = _trace(small, how, kind)
             result.failures.append(Failure(kind, seed, small, place or f"segment {segment}, call {call}", calls))
     counts.update(_compared([(data, g) for g, data in made.values()], how, seen, result, kinds, folder))
@@ -154,16 +157,16 @@ def _left(how: Work) -> float:
     return min(how.smaller, how.until - time.time())
 
 
-def _hostile_kinds(data: Data, how: Work, segment: int) -> set[str]:
-    """The kinds of failure of a spec by itself, in about as many segments as it took before."""
+def _fails(kind: str, how: Work, segment: int, data: Data) -> bool:
+    """Whether a spec by itself fails so, in about as many segments as it took before."""
     try:
         generated = built(data)
     except Exception:
-        return set()
+        return False
     with tempfile.TemporaryDirectory(prefix="campaign-") as folder:
         program = compile_batch(Path(folder), {data["name"]: (generated, data)}, _mended({"": (generated, data)}, how))
         told = run(program, 0, 0, 2 * segment + 2000, 3.0)
-    return {kind for kind, *_ in told.failures}
+    return kind in {found for found, *_ in told.failures}
 
 
 def _trace(data: Data, how: Work, kind: str) -> tuple[str, str]:
@@ -196,13 +199,13 @@ def _compared(
             bare = kind.partition(", call")[0]
             kinds[f"{bare}\0{seed}"] += 1
             if f"{bare} {class_of(data)}" not in seen:
-                small = minimised(data, lambda d, k=bare: _still(d, k, seed, folder), _left(how))
+                small = minimised(data, partial(_still, bare, seed, folder), _left(how))
                 result.failures.append(Failure(bare, seed, small, kind.partition(", ")[2], ""))
     result.unfollowed = dict(unfollowed)
     return counts
 
 
-def _still(data: Data, kind: str, seed: int, folder: Path) -> bool:
+def _still(kind: str, seed: int, folder: Path, data: Data) -> bool:
     try:
         kf = _loaded([built(data)], folder)[0]
         return kind in {found.partition(", call")[0] for found in _compare(kf, data, seed)[0]}
@@ -214,7 +217,7 @@ def _compare(kf: Any, data: Data, seed: int) -> tuple[list[str], int, str]:
     try:
         with _limited(LONGEST), np.errstate(all="ignore"):
             return compare(kf, data, seed)
-    except TooSlow:
+    except TooSlowError:
         return [], 0, "too slow"
     except KfgenError as error:  # no track can be drawn
         return [], 0, str(error)[:80]

@@ -19,7 +19,7 @@ from kfgen.status import ERROR, Status
 from tests.campaign.generate import text_of
 from tests.campaign.jets import Array
 from tests.campaign.model import Data
-from tests.campaign.oracle_model import Unfollowed
+from tests.campaign.oracle_model import UnfollowedError
 from tests.campaign.oracle_points import oracle
 
 STEPS = 25
@@ -70,7 +70,7 @@ class _Second:
         self.reason = ""
         try:
             self.kf: Any = oracle(data)
-        except Unfollowed as reason:
+        except UnfollowedError as reason:
             self.kf, self.reason = None, str(reason)
 
     def call(self, sensor: str | None, arguments: dict[str, Any]) -> None:
@@ -86,7 +86,7 @@ class _Second:
                     m = len(arguments["z"])
                     mask = arguments.get("mask", (1 << m) - 1)
                     self.kf.update(sensor, arguments["z"], u, [i for i in range(m) if mask >> i & 1])
-        except (Unfollowed, np.linalg.LinAlgError) as reason:
+        except (UnfollowedError, np.linalg.LinAlgError) as reason:
             self.kf, self.reason = None, str(reason)
 
 
@@ -123,15 +123,19 @@ def _double(kf: NativeFilter, data: Data, seed: int) -> tuple[list[str], int, st
                 continue
             wrong = _differs(kf.x, kf.P, other.x, other.P, ref, largest, top, tolerance)
             if wrong:
-                agreed = name == "reference" and second.kf is not None and not _differs(
-                    second.kf.x, second.kf.P, ref.x, ref.P, ref, largest, top, 10 * tolerance
+                agreed = (
+                    name == "reference"
+                    and second.kf is not None
+                    and not _differs(second.kf.x, second.kf.P, ref.x, ref.P, ref, largest, top, 10 * tolerance)
                 )
                 told = " (both agree)" if agreed else ""
                 return [f"{what}: {wrong} differs from the {name}{told}, call {k}"], count, second.reason
     return [], count, second.reason
 
 
-def _differs(x: Array, P: Array, other_x: Array, other_P: Array, ref: Any, largest: Array, top: Array, tolerance: float) -> str:
+def _differs(
+    x: Array, P: Array, other_x: Array, other_P: Array, ref: Any, largest: Array, top: Array, tolerance: float
+) -> str:
     """Which of x and P differ: x of its largest and of sigma, P of sqrt(P_ii P_jj) down to 1e-9 of what they were."""
     d = np.abs(x - other_x)
     for i, period in getattr(ref.model, "periods", {}).items():
@@ -163,7 +167,10 @@ def _fixed(kf: NativeFilter, data: Data, seed: int) -> tuple[list[str], int, str
     for sensor, arguments in calls(spec, seed):
         ours, theirs = _made(kf, sensor, arguments), _made(ref, sensor, arguments)
         count += 1
-        inside = all("range" not in s or s["range"][0] <= v <= s["range"][1] for s, v in zip(data["states"].values(), ref.x, strict=True))
+        inside = all(
+            "range" not in s or s["range"][0] <= v <= s["range"][1]
+            for s, v in zip(data["states"].values(), ref.x, strict=True)
+        )
         if not inside:
             break
         if ours & Status.SATURATED:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -15,11 +16,12 @@ import cffi
 import jinja2
 
 from kfgen.generate import Generated
+from tests.campaign import plausible
 from tests.campaign.model import Data
 
-HERE = Path(__file__).parent
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 FLAGS = ("-std=c99", "-O1", "-g0", "-w", "-fno-math-errno", "-fno-omit-frame-pointer", *SANITIZERS)
+ABORT = {"ASAN_OPTIONS": "abort_on_error=1:detect_leaks=0", "UBSAN_OPTIONS": "abort_on_error=1"}
 EVERYTHING = 1 << 62  # segments: time ends them
 
 
@@ -37,8 +39,11 @@ class Told:
 
 @cache
 def _template(name: str) -> jinja2.Template:
-    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string((HERE / name).read_text())
+    loader = jinja2.FileSystemLoader(Path(__file__).parent)
+    environment = jinja2.Environment(
+        loader=loader, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template(name)
 
 
 def compile_batch(folder: Path, batch: Mapping[str, tuple[Generated, Data]], mend: Mapping[str, str] = {}) -> Path:
@@ -73,7 +78,10 @@ def run(program: Path, index: int, first: int, count: int, seconds: float, trace
     """Segments `first` ... of the filter `index` of a batch, until `count` are done or the time is over."""
     call = [str(program), str(index), str(first), str(count), f"{seconds:.3f}", *(["trace"] if trace else [])]
     try:
-        done = subprocess.run(call, capture_output=True, text=True, check=False, timeout=seconds * 10 + 60)
+        environment = {**os.environ, **ABORT}
+        done = subprocess.run(
+            call, capture_output=True, text=True, check=False, timeout=seconds * 10 + 60, env=environment
+        )
     except subprocess.TimeoutExpired:
         return Told(failures=[("a call does not end", 1, first, 0)])
     told = Told(text=done.stdout if trace else done.stderr)
@@ -103,30 +111,33 @@ def driver(generated: Generated, data: Data) -> str:
     fields = _fields(spec.name, declared.text)
     n = len(spec.states)
     fixed = declared.fraction_bits is not None
-    unit = _units(declared.units) if fixed else (lambda name: 1.0)
+    unit = plausible.units_of(declared.units) if fixed else (lambda name: 1.0)
     return _template("driver.c.j2").render(
         name=spec.name,
         NAME=spec.name.upper(),
         n=n,
         fixed=fixed,
         single=declared.real == "float",
-        positive=_positive(data),
-        x_scale=[_scale(state) / unit(state_name) for state_name, state in data["states"].items()],
+        positive=plausible.positive(data),
+        x_scale=[plausible.scale(state) / unit(state_name) for state_name, state in data["states"].items()],
         P_unit=2.0 ** -(declared.fraction_bits or 0),
         covariance=declared.has("get_covariance"),
         fields=[each for each in fields if each["real"]],
         variances=_variances(fields, n),
         weights=[each for each in fields if each["path"] == "mu[0]"],
         counts=[each["path"] for each in fields if each["path"].startswith("gate_count")],
-        turns=_turns(data),
-        bounds=[] if spec.imm else [(i, *state["bounds"]) for i, state in _where(data, "bounds")],
-        limits=_limits(data),
+        turns=plausible.turns(data),
+        bounds=[] if spec.imm else [(i, *state["bounds"]) for i, state in plausible.having(data, "bounds")],
+        limits=plausible.limits(data),
         slack=2e-3 if declared.real == "float" else 1e-6,
-        parameters=[_parameter(name, entry, unit(name)) for name, entry in data.get("parameters", {}).items()],
-        inputs=[{"name": name, "scale": _size(entry, 2.0) / unit(name)} for name, entry in data.get("inputs", {}).items()],
+        parameters=[plausible.parameter(name, entry, unit(name)) for name, entry in data.get("parameters", {}).items()],
+        inputs=[
+            {"name": name, "scale": plausible.size(entry, 2.0) / unit(name)}
+            for name, entry in data.get("inputs", {}).items()
+        ],
         predict_u=declared.takes("predict", "u"),
         predict_dt=declared.takes("predict", "dt"),
-        dt=_step(data, unit("dt")),
+        dt=plausible.step(data, unit("dt")),
         redraw=declared.has("redraw"),
         setters=[
             {"name": name, "root": int("sqrt" in name), "below": below}
@@ -151,7 +162,7 @@ def _updates(generated: Generated, data: Data, unit: Any) -> Sequence[Data]:
                 "sensor": sensor,
                 "first": next(iter(z)),
                 "below": 18 + 48 * (k + 1) // len(functions),
-                "scale": [_size(c, 3.0) / unit(f"{sensor}_{name}") for name, c in z.items()],
+                "scale": [plausible.size(c, 3.0) / unit(f"{sensor}_{name}") for name, c in z.items()],
                 "full": (1 << len(z)) - 1,
                 "masked": generated.declarations.takes(function, "mask"),
                 "u": generated.declarations.takes(function, "u"),
@@ -193,82 +204,3 @@ def _variances(fields: Sequence[Data], n: int) -> list[Data]:
         elif each["leaf"] == "P[0]" and each["size"] == n * (n + 1) // 2:
             made.append({"path": each["path"], "n": n, "index": "j * (j + 3u) / 2u"})
     return made
-
-
-def _units(units: Mapping[str, float]) -> Any:
-    by_name = {name.upper(): value for name, value in units.items()}
-    return lambda name: by_name.get(name.upper(), 1.0)
-
-
-def _number(value: Any, default: float) -> float:
-    return float(value) if isinstance(value, int | float) and value else default
-
-
-def _size(entry: Any, default: float) -> float:
-    """Half the width of a declared range."""
-    ends = (entry or {}).get("range")
-    return max(abs(_number(end, default)) for end in ends) / 2 if ends else default
-
-
-def _scale(state: Data) -> float:
-    return max(_number(state.get("std"), 0.0), abs(_number(state.get("init"), 0.0)), 1e-3) if "range" not in state else (
-        _size(state, 1.0) / 8
-    )
-
-
-def _parameter(name: str, entry: Any, unit: float) -> Data:
-    entry = entry if isinstance(entry, dict) else {"value": entry}
-    value = _number(entry.get("value"), 1.0)
-    low, high = entry.get("range", (value / 2, value * 2))
-    return {"name": name, "low": _number(low, value / 8) / unit, "high": _number(high, value) / unit}
-
-
-def _step(data: Data, unit: float) -> Data:
-    dt = data.get("dt")
-    dt = dt if isinstance(dt, dict) else {"nominal": dt}
-    nominal = _number(dt.get("nominal"), 0.1)
-    return {"low": _number(dt.get("min"), nominal / 2) / unit, "high": _number(dt.get("max"), nominal * 2) / unit}
-
-
-def _where(data: Data, key: str) -> list[tuple[int, Data]]:
-    return [(i, state) for i, state in enumerate(data["states"].values()) if key in state]
-
-
-def _turns(data: Data) -> list[tuple[int, str]]:
-    made = []
-    for i, state in _where(data, "kind"):
-        kind = state["kind"]
-        if kind == "angle":
-            made.append((i, "3.14159265358979323846"))
-        elif isinstance(kind, dict) and isinstance(kind["periodic"], int | float):
-            made.append((i, repr(kind["periodic"] / 2)))
-    return made
-
-
-def _limits(data: Data) -> list[tuple[int, str, str]]:
-    """(state, floor, ceiling) as the filter promises them; a bank combines, so promises nothing."""
-    options = data["filter"]
-    if "imm" in data or not {"variance_floor", "variance_ceiling"} & set(options):
-        return []
-    made = []
-    for i, name in enumerate(data["states"]):
-        ends = []
-        for key, default in (("variance_floor", -1.0), ("variance_ceiling", 1e300)):
-            value = options.get(key)
-            value = value.get(name) if isinstance(value, dict) else value
-            ends.append(repr(_number(value, default)))
-        made.append((i, *ends))
-    return made
-
-
-def _positive(data: Data) -> bool:
-    """Whether NOT_POSITIVE is never right: no negative weights among the points."""
-    filters = [data["filter"], *(mode.get("filter", {}) for mode in data.get("imm", {}).get("modes", {}).values())]
-    for options in filters:
-        points = options.get("sigma_points", {})
-        kind = points.get("kind", "merwe")
-        if kind == "custom" or (kind == "julier" and _number(points.get("kappa"), 0.0) < 0):
-            return False
-        if kind in ("merwe", "wiki") and _number(points.get("beta"), 2.0) < _number(points.get("alpha"), 1.0) ** 2:
-            return False
-    return data.get("campaign", True) is True

@@ -55,7 +55,9 @@ class Jet:
         if isinstance(other, Jet):
             return exp(other * log(self))
         n = float(other)
-        return self.through(self.v**n, n * self.v ** (n - 1) if n else 0.0, n * (n - 1) * self.v ** (n - 2) if n * (n - 1) else 0.0)
+        return self.through(
+            self.v**n, n * self.v ** (n - 1) if n else 0.0, n * (n - 1) * self.v ** (n - 2) if n * (n - 1) else 0.0
+        )
 
     def __rpow__(self, other: Any) -> Jet:
         return self.lift(other) ** self
@@ -98,9 +100,7 @@ def _zero(a: Any) -> float:
 
 exp = _unary(np.exp, np.exp, np.exp)
 log = _unary(np.log, lambda a: 1 / a, lambda a: -1 / a**2)
-_sqrt = _unary(
-    np.sqrt, lambda a: 0.5 / np.sqrt(a) if a > 0 else 0.0, lambda a: -0.25 / a**1.5 if a > 0 else 0.0
-)
+_sqrt = _unary(np.sqrt, lambda a: 0.5 / np.sqrt(a) if a > 0 else 0.0, lambda a: -0.25 / a**1.5 if a > 0 else 0.0)
 
 
 def _hypot(a: Any, b: Any) -> Any:

@@ -65,7 +65,9 @@ def candidates(data: Data) -> Iterator[Data]:
                 yield _with(data, shorter, "measurements", sensor, "z", component, "h")
     if isinstance(data.get("dt"), dict):
         yield _with(data, data["dt"]["nominal"], "dt")
-    if data["dynamics"].get("form") == "continuous" and not any("density" in str(w) for w in data.get("noise", {}).values()):
+    if data["dynamics"].get("form") == "continuous" and not any(
+        "density" in str(w) for w in data.get("noise", {}).values()
+    ):
         yield _with(data, {"f": data["dynamics"]["f"], "Q": data["dynamics"].get("Q", {})}, "dynamics")
 
 
@@ -148,7 +150,9 @@ def _with(data: Data, value: Any, *path: str) -> Data:
 def _valued(part: Any, values: dict[str, str]) -> Any:
     """Names replaced by values in every expression; a name that stands alone as a key or entry is not one."""
     if isinstance(part, dict):
-        return {key: value if key in ("name", "type", "kind") else _valued(value, values) for key, value in part.items()}
+        return {
+            key: value if key in ("name", "type", "kind") else _valued(value, values) for key, value in part.items()
+        }
     if isinstance(part, list):
         return [_valued(each, values) for each in part]
     if isinstance(part, str):

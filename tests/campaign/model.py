@@ -101,7 +101,9 @@ class Draw:
             return
         rank = self.n if self.chance(0.6) else self.dice.randrange(1, self.n + 1)
         A = [[self.dice.randrange(-4, 5) / 4 * self.scales[i] for _ in range(rank)] for i in range(self.n)]
-        data["P0"] = [[sum(a * b for a, b in zip(A[i], A[j], strict=True)) for j in range(self.n)] for i in range(self.n)]
+        data["P0"] = [
+            [sum(a * b for a, b in zip(A[i], A[j], strict=True)) for j in range(self.n)] for i in range(self.n)
+        ]
         for state in data["states"].values():
             del state["std"]
 
@@ -142,7 +144,9 @@ class Draw:
             f[name] = " + ".join(terms) or "0"
         made: Data = {"form": "continuous" if self.continuous else "discrete", "f": f}
         if self.continuous:
-            kinds = ("euler", "midpoint", "rk4", "exact") if self.linear and self.n < 4 else ("euler", "midpoint", "rk4")
+            kinds = (
+                ("euler", "midpoint", "rk4", "exact") if self.linear and self.n < 4 else ("euler", "midpoint", "rk4")
+            )
             made["integrator"] = self.dice.choice(kinds)
             if self.chance(0.2) and made["integrator"] != "exact":
                 made["substeps"] = 2
@@ -179,7 +183,10 @@ class Draw:
             sensor["z"][f"z{k}"] = self.component(full, noise, let)
         if full:
             A = [[self.dice.randrange(-3, 4) / 8 for _ in range(m)] for _ in range(m)]
-            R = [[sum(a * b for a, b in zip(A[i], A[j], strict=True)) + 0.1 * (i == j) for j in range(m)] for i in range(m)]
+            R = [
+                [sum(a * b for a, b in zip(A[i], A[j], strict=True)) + 0.1 * (i == j) for j in range(m)]
+                for i in range(m)
+            ]
             varied = self.parameters and self.chance(0.5)
             sensor["R"] = [[f"{v:g}*p0**2" if varied else v for v in row] for row in R]
         if noise:

@@ -1,6 +1,6 @@
 """The second oracle: dense filters in numpy, from the formulas of the textbooks and a spec's plain data alone.
 
-It shares no code with kfgen, its reference included. What it does not follow raises Unfollowed, which says what.
+It shares no code with kfgen, its reference included. What it does not follow raises UnfollowedError, which says what.
 Bierman 1977; Bell & Cathey 1993 (iekf); Athans 1968 (second order); adaptive and robust as kfgen's language has them.
 """
 
@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaincinv
 
-from tests.campaign.jets import Array, evaluate
-from tests.campaign.oracle_model import Model, Unfollowed, wrapped
+from tests.campaign.jets import Array, Names, evaluate, variables
+from tests.campaign.oracle_model import Model, UnfollowedError, wrapped
 
 OK, GLITCH_SMALL, GLITCH_LARGE, ANOMALY, GATED = 0, 2, 4, 8, 16
 
@@ -42,12 +42,12 @@ class Oracle:
         self.options = data["filter"] if options is None else options
         for key in ("innovation_floor", "reject", "gain"):
             if self.options.get(key):
-                raise Unfollowed(key)
+                raise UnfollowedError(key)
         self.type = self.options.get("type", "ekf")
         if "adapt_R" in self.options and (self.type not in ("kf", "ekf") or self.model.sensor_noises):
-            raise Unfollowed("adapt_R of other than an ekf")
+            raise UnfollowedError("adapt_R of other than an ekf")
         if self.type == "ekf2" and self.model.dense:
-            raise Unfollowed("density with ekf2")
+            raise UnfollowedError("density with ekf2")
         self.x, self.P = self.model.start()
         self.t, self.nis, self.log_likelihood = 0.0, 0.0, 0.0
         self.refused = dict.fromkeys(data["measurements"], 0)
@@ -165,8 +165,10 @@ class Oracle:
                 K = np.clip(K, -options["gain_limit"], options["gain_limit"])
             A = np.eye(n) - g * np.outer(K, h)
             # with the gain that minimises it this is P - g P h^T h P / s; r g K K^T is the noise's share
-            P = A @ P @ A.T + g * r * np.outer(K, K) if g == 1 or held or "gain_limit" in options else (
-                P - g * np.outer(P @ h, P @ h) / s
+            P = (
+                A @ P @ A.T + g * r * np.outer(K, K)
+                if g == 1 or held or "gain_limit" in options
+                else (P - g * np.outer(P @ h, P @ h) / s)
             )
             dx += K * nu
             moved += np.outer(K * nu, K * nu)
@@ -191,7 +193,7 @@ class Oracle:
             if k == 0 and not self.passes(sensor, plain(y, H, self.P, R)[0], len(used)):
                 return GATED
             if held or limit < np.inf:
-                raise Unfollowed("an iekf whose gain is changed")
+                raise UnfollowedError("an iekf whose gain is changed")
             back = wrapped(self.x - x, self.model.periods)
             S = H @ self.P @ H.T + R
             K = self.P @ H.T @ np.linalg.pinv(S, hermitian=True)
@@ -230,8 +232,6 @@ def influence(robust: Any, e: float) -> tuple[float, float]:
     if robust == "huber" or robust.get("influence") == "huber":
         k = 1.345 if robust == "huber" else robust.get("k", 1.345)
         return float(np.clip(e, -k, k)), float(abs(e) <= k)
-    from tests.campaign.jets import Names, variables
-
     psi = evaluate(robust["psi"], Names({"e": variables([e])[0]}, {}))
     return float(psi.v), max(float(psi.g[0]), 0.0)
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from tests.campaign.jets import Array, Jet, Names, constant, evaluate, variables
 
 
-class Unfollowed(Exception):
+class UnfollowedError(Exception):
     """What the oracle does not follow."""
 
 
@@ -49,7 +49,7 @@ class Model:
         self.nu = len(self.inputs)
         self.noises: dict[str, Any] = data.get("noise", {})
         if any(key in data for key in ("noise_covariance", "initialize")):
-            raise Unfollowed("noise_covariance, initialize")
+            raise UnfollowedError("noise_covariance, initialize")
         self.dense = any("density" in w or "root_density" in w for w in self.noises.values())
         self.sensor_noises = any("noise" in s for s in data["measurements"].values())
         self.parameters = {
@@ -185,7 +185,7 @@ class Model:
         """z - h of the components in use, wrapped."""
         components = list(self.data["measurements"][sensor]["z"].values())
         if any("residual" in component for component in components):
-            raise Unfollowed("residual")
+            raise UnfollowedError("residual")
         return wrapped(z[used] - h, [period(components[i]) for i in used])
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from tests.campaign.jets import Array
-from tests.campaign.oracle import ANOMALY, GATED, OK, Oracle, adaptive_threshold, udu
-from tests.campaign.oracle_model import Unfollowed, wrapped
+from tests.campaign.jets import Array, evaluate
+from tests.campaign.oracle import ANOMALY, GATED, OK, Oracle, adaptive_threshold, plain, udu
+from tests.campaign.oracle_model import UnfollowedError, period, wrapped
 
 
 def weights(options: dict[str, Any], L: int) -> tuple[float, float, float, float, float, bool]:
@@ -27,7 +27,7 @@ def weights(options: dict[str, Any], L: int) -> tuple[float, float, float, float
         return L, 1 / (2 * L + 1), 1 / (2 * L), 1 / (2 * L + 1), 1 / (2 * L), True
     if kind == "cubature":
         return L, 0.0, 0.0, 1 / (2 * L), 1 / (2 * L), False
-    raise Unfollowed("custom points")
+    raise UnfollowedError("custom points")
 
 
 def lower(P: Array) -> Array:
@@ -48,9 +48,9 @@ class PointOracle(Oracle):
     def __init__(self, data: dict[str, Any], options: dict[str, Any] | None = None) -> None:
         super().__init__(data, options)
         if not self.options.get("sigma_points", {}).get("redraw", True):
-            raise Unfollowed("redraw: false")
+            raise UnfollowedError("redraw: false")
         if any("bounds" in state for state in data["states"].values()) or self.model.dense:
-            raise Unfollowed("bounds or density with a ukf")
+            raise UnfollowedError("bounds or density with a ukf")
         self.points = self.options.get("sigma_points", {})
         random = np.random.default_rng(1)
         n, probes = self.model.n, []
@@ -58,7 +58,9 @@ class PointOracle(Oracle):
             x, u = random.normal(size=n), random.normal(size=self.model.nu)
             probes.append(np.abs(self.model.step(x, u, self.model.nominal, 0.3).H))
         H = np.max(probes, axis=0)
-        self.curved_noises = [j for j in range(len(self.model.noises)) if self.options.get("augment") or H[:, n + j].any()]
+        self.curved_noises = [
+            j for j in range(len(self.model.noises)) if self.options.get("augment") or H[:, n + j].any()
+        ]
         self.curved_f = H[:, :n, :].any(axis=(1, 2)) | H[:, n:, :].any(axis=(1, 2))
 
     def draw(self, P: Array, Qw: Array) -> tuple[Array, Array, tuple[float, ...]]:
@@ -76,7 +78,9 @@ class PointOracle(Oracle):
         both = np.vstack([columns, -columns])
         return both[:, :n], both[:, n:], w
 
-    def moments(self, images: Array, centre: Array, periods: list[float | None], w: Any) -> tuple[Array, Array, Array, Array]:
+    def moments(
+        self, images: Array, centre: Array, periods: list[float | None], w: Any
+    ) -> tuple[Array, Array, Array, Array]:
         """Mean, deviations (points, m), that of the centre, covariance."""
         e = np.array([wrapped(image - centre, periods) for image in images]).reshape(len(images), len(centre))
         d = w[3] * e.sum(axis=0)
@@ -108,7 +112,10 @@ class PointOracle(Oracle):
         model, n = self.model, self.model.n
         look = model.look(sensor, self.x, u, self.t)
         random = np.random.default_rng(2)
-        H = np.max([np.abs(model.look(sensor, random.normal(size=n), random.normal(size=model.nu), 0.3).H) for _ in range(3)], axis=0)
+        H = np.max(
+            [np.abs(model.look(sensor, random.normal(size=n), random.normal(size=model.nu), 0.3).H) for _ in range(3)],
+            axis=0,
+        )
         k = len(look.Qw)
         inside = [j for j in range(k) if H[:, n + j].any() or self.options.get("augment")]
         outside = [j for j in range(k) if j not in inside]
@@ -117,15 +124,13 @@ class PointOracle(Oracle):
         dx, de, w = self.draw(self.P, look.Qw[np.ix_(inside, inside)])
         entry = model.data["measurements"][sensor]
         images = []
-        from tests.campaign.jets import evaluate
-
         for a, b in zip([*dx, np.zeros(n)], [*de, np.zeros(len(inside))], strict=True):
             noise = np.zeros(k)
             noise[inside] = b
-            names = model.names(list(self.x + a), u, None, self.t, **dict(zip(entry.get("noise", {}), noise, strict=True)))
+            names = model.names(
+                list(self.x + a), u, None, self.t, **dict(zip(entry.get("noise", {}), noise, strict=True))
+            )
             images.append([float(evaluate(c["h"], names)) for c in entry["z"].values()])
-        from tests.campaign.oracle_model import period
-
         bent = H.any(axis=(1, 2))
         periods = [period(c) if b else None for c, b in zip(entry["z"].values(), bent, strict=True)]
         zp, dev, _, Pzz = self.moments(np.array(images[:-1]), np.array(images[-1]), periods, w)
@@ -137,8 +142,6 @@ class PointOracle(Oracle):
         y = self.model.residual(sensor, z, zp, used)
         if self.options.get("sequential"):
             H = Pxz.T @ np.linalg.pinv(self.P, hermitian=True, rcond=1e-12)
-            from tests.campaign.oracle import plain
-
             if not self.passes(sensor, plain(y, H, self.P, R)[0], len(used)):
                 return GATED
             flags = self.gate_flag
@@ -156,8 +159,10 @@ class PointOracle(Oracle):
             zp, Pzz, Pxz, R = self.sight(sensor, u, used)
             y, S = self.model.residual(sensor, z, zp, used), Pzz + R
         K = Pxz @ np.linalg.pinv(S, hermitian=True)
-        sign, logarithm = np.linalg.slogdet(S)
-        self.log_likelihood = -0.5 * (len(y) * np.log(2 * np.pi) + y @ np.linalg.pinv(S, hermitian=True) @ y + logarithm)
+        logarithm = np.linalg.slogdet(S)[1]
+        self.log_likelihood = -0.5 * (
+            len(y) * np.log(2 * np.pi) + y @ np.linalg.pinv(S, hermitian=True) @ y + logarithm
+        )
         self.finish(self.x + K @ y, self.P - K @ S @ K.T)
         return flags
 
@@ -169,10 +174,10 @@ class BankOracle:
         imm = data["imm"]
         self.M, self.mu = np.array(imm["transition"], dtype=float), np.array(imm["mu0"], dtype=float)
         self.floor = imm.get("mu_floor", 1e-9)
-        plain = {key: value for key, value in data.items() if key != "imm"}
-        self.modes = [oracle({**plain, **mode}) for mode in imm["modes"].values()]
+        common = {key: value for key, value in data.items() if key != "imm"}
+        self.modes = [oracle({**common, **mode}) for mode in imm["modes"].values()]
         if any("gate" in sensor for sensor in data["measurements"].values()):
-            raise Unfollowed("gates in a bank")
+            raise UnfollowedError("gates in a bank")
         self.model = self.modes[0].model
         self.combine()
 
@@ -217,7 +222,7 @@ class BankOracle:
 
 
 def oracle(data: dict[str, Any]) -> Any:
-    """The oracle of a spec's plain data; Unfollowed where it has none."""
+    """The oracle of a spec's plain data; UnfollowedError where it has none."""
     if "imm" in data:
         return BankOracle(data)
     return PointOracle(data) if data["filter"].get("type") == "ukf" else Oracle(data)

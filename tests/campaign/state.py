@@ -66,7 +66,9 @@ class State:
             self.totals[part].update(getattr(result, part))
         for failure in result.failures:
             self.keep(failure)
-        text = json.dumps({"done": sorted(self.done), **{part: dict(self.totals[part]) for part in self.PARTS}}, indent=1)
+        text = json.dumps(
+            {"done": sorted(self.done), **{part: dict(self.totals[part]) for part in self.PARTS}}, indent=1
+        )
         beside = self._file.with_suffix(".new")
         beside.write_text(text)
         os.replace(beside, self._file)
@@ -100,7 +102,7 @@ class State:
             f"refused {counts['refused']}",
             f"hostile and fair calls {counts['calls']:.3e}: OK {counts['ok']:.2e}, warned {counts['warned']:.2e}, "
             f"refused {counts['refused_calls']:.2e}",
-            f"calls beside the reference {counts['compared']}, specs that the second oracle followed {counts['followed']}",
+            f"calls beside the reference {counts['compared']}; the second oracle followed {counts['followed']} specs",
             f"failing specs {counts['failing']}; failures by kind (specs):",
         ]
         lines += [f"  {often:6d}  {kind}" for kind, often in self.totals["kinds"].most_common()] or ["  none"]
@@ -113,5 +115,3 @@ class State:
 
 def slug(kind: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", kind.lower()).strip("-")[:60]
-
-
