@@ -837,9 +837,9 @@ ahrs_status_t ahrs_update_accel(ahrs_t *kf, const ahrs_accel_t *z)
 
     /* gate */
     const bool t208 = nis > 16.266235f;
-    if (t208 && kf->gate_count_accel < 50) {
+    if (t208 && kf->gate_count_accel < 50u) {
         kf->nis = nis;
-        kf->gate_count_accel = kf->gate_count_accel + 1;
+        kf->gate_count_accel = kf->gate_count_accel + 1u;
         return AHRS_GATED;
     }
     if (t208) { flags |= AHRS_ANOMALY; }
@@ -1214,9 +1214,9 @@ ahrs_status_t ahrs_update_mag(ahrs_t *kf, const ahrs_mag_t *z)
 
     /* gate */
     const bool t218 = nis > 16.266235f;
-    if (t218 && kf->gate_count_mag < 50) {
+    if (t218 && kf->gate_count_mag < 50u) {
         kf->nis = nis;
-        kf->gate_count_mag = kf->gate_count_mag + 1;
+        kf->gate_count_mag = kf->gate_count_mag + 1u;
         return AHRS_GATED;
     }
     if (t218) { flags |= AHRS_ANOMALY; }

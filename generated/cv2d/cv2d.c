@@ -9,10 +9,10 @@
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
 #define CV2D_flash PROGMEM
-#define CV2D_order(i) pgm_read_byte(&cv2d_order[i])
+#define CV2D_order(i) ((int)pgm_read_byte(&cv2d_order[i]))
 #else
 #define CV2D_flash
-#define CV2D_order(i) cv2d_order[i]
+#define CV2D_order(i) ((int)cv2d_order[i])
 #endif
 
 /* inner position -> index into x */

@@ -9,10 +9,10 @@
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
 #define CV4_flash PROGMEM
-#define CV4_order(i) pgm_read_byte(&cv4_order[i])
+#define CV4_order(i) ((int)pgm_read_byte(&cv4_order[i]))
 #else
 #define CV4_flash
-#define CV4_order(i) cv4_order[i]
+#define CV4_order(i) ((int)cv4_order[i])
 #endif
 
 /* inner position -> index into x */

@@ -11,10 +11,10 @@
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
 #define GPS_flash PROGMEM
-#define GPS_order(i) pgm_read_byte(&gps_order[i])
+#define GPS_order(i) ((int)pgm_read_byte(&gps_order[i]))
 #else
 #define GPS_flash
-#define GPS_order(i) gps_order[i]
+#define GPS_order(i) ((int)gps_order[i])
 #endif
 
 /* inner position -> index into x */

@@ -1052,9 +1052,9 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     /* gate */
     const bool t141 = nis_cruise > 18.420681f && nis_speed > 18.420681f && nis_turn > 18.420681f;
     const float t142 = maneuver_min(maneuver_min(nis_cruise, nis_speed), nis_turn);
-    if (t141 && kf->gate_count_radar < 3) {
+    if (t141 && kf->gate_count_radar < 3u) {
         kf->nis = t142;
-        kf->gate_count_radar = kf->gate_count_radar + 1;
+        kf->gate_count_radar = kf->gate_count_radar + 1u;
         return MANEUVER_GATED;
     }
     if (t141) { flags |= MANEUVER_ANOMALY; }

@@ -285,9 +285,9 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
 
     /* gate */
     const bool t10 = nis > 13.815511f;
-    if (t10 && kf->gate_count_camera < 10) {
+    if (t10 && kf->gate_count_camera < 10u) {
         kf->nis = nis;
-        kf->gate_count_camera = kf->gate_count_camera + 1;
+        kf->gate_count_camera = kf->gate_count_camera + 1u;
         return PENDULUM_GATED;
     }
     if (t10) { flags |= PENDULUM_ANOMALY; }

@@ -11,10 +11,10 @@
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
 #define TRACKER_flash PROGMEM
-#define TRACKER_order(i) pgm_read_byte(&tracker_order[i])
+#define TRACKER_order(i) ((int)pgm_read_byte(&tracker_order[i]))
 #else
 #define TRACKER_flash
-#define TRACKER_order(i) tracker_order[i]
+#define TRACKER_order(i) ((int)tracker_order[i])
 #endif
 
 /* inner position -> index into x */

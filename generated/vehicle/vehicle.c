@@ -11,10 +11,10 @@
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
 #define VEHICLE_flash PROGMEM
-#define VEHICLE_order(i) pgm_read_byte(&vehicle_order[i])
+#define VEHICLE_order(i) ((int)pgm_read_byte(&vehicle_order[i]))
 #else
 #define VEHICLE_flash
-#define VEHICLE_order(i) vehicle_order[i]
+#define VEHICLE_order(i) ((int)vehicle_order[i])
 #endif
 
 /* inner position -> index into x */
@@ -378,9 +378,9 @@ vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z)
 
     /* gate */
     const bool t71 = nis > 13.815511f;
-    if (t71 && kf->gate_count_gnss < 10) {
+    if (t71 && kf->gate_count_gnss < 10u) {
         kf->nis = nis;
-        kf->gate_count_gnss = kf->gate_count_gnss + 1;
+        kf->gate_count_gnss = kf->gate_count_gnss + 1u;
         return VEHICLE_GATED;
     }
     if (t71) { flags |= VEHICLE_ANOMALY; }
@@ -473,9 +473,9 @@ vehicle_status_t vehicle_update_speed(vehicle_t *kf, const vehicle_speed_t *z)
 
     /* gate */
     const bool t3 = nis > 15.136705f;
-    if (t3 && kf->gate_count_speed < 10) {
+    if (t3 && kf->gate_count_speed < 10u) {
         kf->nis = nis;
-        kf->gate_count_speed = kf->gate_count_speed + 1;
+        kf->gate_count_speed = kf->gate_count_speed + 1u;
         return VEHICLE_GATED;
     }
     if (t3) { flags |= VEHICLE_ANOMALY; }

@@ -11,10 +11,10 @@
 #if defined(__AVR__)
 #include <avr/pgmspace.h>
 #define VEHICLE_TUTORIAL_flash PROGMEM
-#define VEHICLE_TUTORIAL_order(i) pgm_read_byte(&vehicle_tutorial_order[i])
+#define VEHICLE_TUTORIAL_order(i) ((int)pgm_read_byte(&vehicle_tutorial_order[i]))
 #else
 #define VEHICLE_TUTORIAL_flash
-#define VEHICLE_TUTORIAL_order(i) vehicle_tutorial_order[i]
+#define VEHICLE_TUTORIAL_order(i) ((int)vehicle_tutorial_order[i])
 #endif
 
 /* inner position -> index into x */

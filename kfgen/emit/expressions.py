@@ -65,6 +65,8 @@ class Expressions:
                 name, i = self.tables[node.data], e(node.args[0])
                 y, slope, x = (self._constant_at(f"{name}_{part}", i) for part in ("y", "slope", "x"))
                 return f"{y} + {slope} * ({e(node.args[1])} - {x})", SUM
+            case "add" if _counts(node.args[0]):  # a signed constant beside an unsigned count breaks MISRA C 10.4
+                return f"{e(node.args[0], SUM)} + {e(node.args[1], _PRODUCT)}u", SUM
             case "add":
                 return f"{e(node.args[0], SUM)} + {e(node.args[1], _PRODUCT)}", SUM
             case "sub":
@@ -82,7 +84,7 @@ class Expressions:
                 a, b = e(node.args[0], SUM), e(node.args[1], SUM)
                 if node.args[0].constant is not None:  # read as x > 0, not 0 < x
                     return f"{b} {_COMPARE[node.op].replace('<', '>')} {a}", _RELATION
-                return f"{a} {_COMPARE[node.op]} {b}", _RELATION
+                return f"{a} {_COMPARE[node.op]} {b}{'u' if _counts(node.args[0]) else ''}", _RELATION
             case "and":
                 return f"{e(node.args[0], _AND)} && {e(node.args[1], _RELATION)}", _AND
             case "or":
@@ -154,3 +156,8 @@ class Expressions:
             named = self.index_name(path, int(index.constant))
             return named if named is not None else str(int(index.constant))
         return self.expression(index)
+
+
+def _counts(node: Node) -> bool:
+    """Whether it is a counter in the struct, which is unsigned and meets nothing but constants."""
+    return node.op == "field" and node.kind == "int" and str(node.data).startswith("kf.")
