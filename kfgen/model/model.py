@@ -15,7 +15,7 @@ from kfgen.geometry import Part, part_of
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
 from kfgen.model.options import INNOVATION, Options, build_options
-from kfgen.model.symbolic import to_sympy
+from kfgen.model.symbolic import constants, to_sympy
 from kfgen.spec.tree import Expression
 from kfgen.spec.types import Matrix, Noise, Sensor, Spec
 
@@ -155,8 +155,7 @@ class _Builder:
 
     def build(self) -> Model:
         spec = self.spec
-        for constant in spec.constants:
-            self.names[constant.name] = self.tree(constant.value)
+        self.names |= constants(spec.constants, lambda e: self.lowering(e).constant)
         # a fixed step and initial values may use parameters: at their spec values
         parameters = [(p.name, self.number(p.value)) for p in spec.parameters]
         folded = {
