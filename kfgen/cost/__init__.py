@@ -29,8 +29,8 @@ def measure(
     """Measure an emitted filter over the first rows of a log.
 
     flags: of the compiler, beside the usual ones. compiler: `gcc` or `zig`; without, the preferred one that is
-    installed. Raises KfgenError for an unknown target, for a missing tool, which it names, and for flags under which the
-    filter's own code cannot be told from the rest.
+    installed. Raises KfgenError for an unknown target, for a missing tool, which it names, and for flags under
+    which the filter's own code cannot be told from the rest.
     """
     found = target_of(target).measure(make_job(emitted, log, rows), flags, compiler)
     for name, size in (("the filter", found.flash), *((n, f.flash) for n, f in found.functions.items() if f.counts)):

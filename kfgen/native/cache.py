@@ -12,8 +12,10 @@ from pathlib import Path
 
 
 def cache_directory() -> Path:
-    """`$XDG_CACHE_HOME/kfgen`, else `~/.cache/kfgen`, where that is the caller's alone (mode 0700); else a fresh private
-    folder, which is removed at the end of the process."""
+    """`$XDG_CACHE_HOME/kfgen`, else `~/.cache/kfgen`, where that is the caller's alone (mode 0700).
+
+    Else a fresh private folder, which is removed at the end of the process.
+    """
     base = os.environ.get("XDG_CACHE_HOME", "")
     # the XDG specification asks to ignore relative paths
     try:
