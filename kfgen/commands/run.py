@@ -43,7 +43,8 @@ def run(spec: Path, log: Path, out: Path | None, plot: Path | None, any_rate: bo
     `partial: true`. An empty input keeps its last value. Per row: predict, then the updates in the spec's
     order. With a run-time dt, dt is t minus the last t, and there is no predict in the first row and for
     equal t. With a fixed dt there is one predict per row; where the log has a t, none for equal t, and t must go on by
-    dt: exit status 2 where it falls, its usual step is not dt (5 %), or over 1 % of its steps exceed 1.5 dt. Exit status 1 where each update failed.
+    dt: exit status 2 where it falls, its usual step is not dt (5 %), or over 1 % of
+    its steps exceed 1.5 dt. Exit status 1 where each update failed.
 
     The result has the columns t, x.<state>, var.<state>, nis.<sensor>, status, mu.<mode>. It goes to OUT.csv,
     or to stdout if neither -o nor --plot is given.

@@ -47,7 +47,7 @@ def find_compiler() -> list[str]:
         return ["zig", *_ZIG]
     if find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", *_ZIG]
-    raise KfgenError("no C compiler found (cc, gcc, clang, zig); install one (`pip install ziglang`), or name it in $CC")
+    raise KfgenError("no C compiler found (cc, gcc, clang, zig); install one (pip install ziglang), or name it in $CC")
 
 
 def build(files: Mapping[str, str], flags: Sequence[str] | None = None, *, afresh: bool = False) -> Path:
