@@ -45,6 +45,17 @@ def constants(entries: Iterable[Constant], value: Callable[[Any], Fraction | Non
     return found
 
 
+def partials(expression: Any) -> tuple[tuple[Any, Any], ...]:
+    """(symbol, derivative) for every symbol on which an expression depends, by name. Of a sum term by term, each by the
+    symbols that it has: a sum of many terms in many symbols is seen once, not once a symbol."""
+    found: dict[Any, list[Any]] = {}
+    for term in sympy.Add.make_args(expression):
+        for symbol in term.free_symbols:
+            found.setdefault(symbol, []).append(term.diff(symbol))
+    pairs = ((s, sympy.Add(*found[s])) for s in sorted(found, key=lambda s: s.name))
+    return tuple((s, d) for s, d in pairs if d != 0)
+
+
 def _power(base: Any, exponent: Any) -> Any:
     if exponent == sympy.Rational(1, 2):
         return kf.root(base)
