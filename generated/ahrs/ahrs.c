@@ -1350,3 +1350,4 @@ void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[49])
         }
     }
 }
+/* kfgen: body 141b9136ef29d0eb141ce5dabf874fb7 */

@@ -348,3 +348,4 @@ void cv2d_get_covariance(const cv2d_t *kf, cv2d_real_t P[16])
         }
     }
 }
+/* kfgen: body 253e14bcb6ec8ee289b42b1044f685f4 */

@@ -307,3 +307,4 @@ void cv4_get_covariance(const cv4_t *kf, cv4_real_t P[16])
         }
     }
 }
+/* kfgen: body 5006c652089c30b4de220ecc8568744a */

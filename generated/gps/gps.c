@@ -498,3 +498,4 @@ void gps_get_covariance(const gps_t *kf, gps_real_t P[25])
         }
     }
 }
+/* kfgen: body c8637758017a347fa581f7ee3ee39bc8 */

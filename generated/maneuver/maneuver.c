@@ -1493,3 +1493,4 @@ void maneuver_get_covariance(const maneuver_t *kf, maneuver_real_t P[36])
         }
     }
 }
+/* kfgen: body 9fea08363014bfa59bf0c21f68266405 */

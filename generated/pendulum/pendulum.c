@@ -472,3 +472,4 @@ void pendulum_get_sqrt_covariance(const pendulum_t *kf, pendulum_real_t S[4])
         }
     }
 }
+/* kfgen: body f34b23ce88eb28198be44a9c3080a297 */

@@ -567,3 +567,4 @@ void tracker_get_covariance(const tracker_t *kf, tracker_real_t P[16])
         }
     }
 }
+/* kfgen: body d4b5aec3f6152c45f52102f546c0ce1b */

@@ -592,3 +592,4 @@ void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25])
         }
     }
 }
+/* kfgen: body a0670beb992d32149f1d00e0fa4c2ff4 */

@@ -336,3 +336,4 @@ void vehicle_tutorial_get_covariance(const vehicle_tutorial_t *kf, vehicle_tutor
         }
     }
 }
+/* kfgen: body 6368e4b2a6354f9ad4fedcafe7db9b03 */
