@@ -68,6 +68,14 @@ def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judg
     overridden = scalar is not None and scalar != spec.scalar
     if scalar is not None:
         spec = replace(spec, scalar=scalar)
+    try:
+        return _built(spec, overridden, log, judge)
+    except RecursionError:
+        cure = "use fewer substeps, shorter formulas, or definitions (let) for what they have in common"
+        raise SpecError.at(spec.dynamics.place, "the program of a step is nested too deeply", cure) from None
+
+
+def _built(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Generated:
     if spec.scalar not in SCALARS:
         return _fixed(spec, overridden, log, judge)
     code = build_filter(spec, SCALARS[spec.scalar], RESERVED)

@@ -254,6 +254,8 @@ class Scopes:
                 known = states
             elif of == "sensor":
                 known = list(sensors)
+            elif of == "function":
+                known = ["predict", *(f"update_{sensor}" for sensor in sensors)]
             elif of == "component":
                 of = f"component of {initialize.sensor}" if initialize else of
                 known = sensors.get(initialize.sensor, []) if initialize else []
