@@ -20,6 +20,7 @@ from kfgen.ir.count import operations
 from kfgen.ir.names import RESERVED
 from kfgen.logs import Log
 from kfgen.scalars import SCALARS, Scalar
+from kfgen.seal import sealed
 from kfgen.spec.types import Spec
 
 UNROLLED = "no loops in fixed point: an element of a covariance has a binary point of its own, and its own code"
@@ -67,6 +68,14 @@ def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judg
     overridden = scalar is not None and scalar != spec.scalar
     if scalar is not None:
         spec = replace(spec, scalar=scalar)
+    try:
+        return _built(spec, overridden, log, judge)
+    except RecursionError:
+        cure = "use fewer substeps, shorter formulas, or definitions (let) for what they have in common"
+        raise SpecError.at(spec.dynamics.place, "the program of a step is nested too deeply", cure) from None
+
+
+def _built(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Generated:
     if spec.scalar not in SCALARS:
         return _fixed(spec, overridden, log, judge)
     code = build_filter(spec, SCALARS[spec.scalar], RESERVED)
@@ -78,7 +87,12 @@ def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judg
             place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
         ) from None
     prediction = _predicted(spec, code, SCALARS[spec.scalar], view, judge)
-    return Generated(render(view), replace(summary(code, view), prediction=prediction), code, view)
+    return Generated(_rendered(view), replace(summary(code, view), prediction=prediction), code, view)
+
+
+def _rendered(view: View) -> dict[str, str]:
+    """The files, each with the hash of its body."""
+    return {name: sealed(name, text) for name, text in render(view).items()}
 
 
 def _predicted(spec: Spec, code: FilterCode, scalar: Scalar, view: View, judge: bool) -> Prediction:
@@ -100,7 +114,7 @@ def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Genera
     if spec.code.unroll == "none":
         told.notes.append(UNROLLED)
     told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
-    return Generated(render(view), told, result.code, view, result)
+    return Generated(_rendered(view), told, result.code, view, result)
 
 
 def summary(code: FilterCode, view: View) -> Summary:

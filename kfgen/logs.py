@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import os
 import re
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import IO
 
@@ -23,6 +25,8 @@ Array = NDArray[np.float64]
 # decimal numbers and NaN; float() would also take `1_000`, other scripts' digits and `infinity`
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan|inf)", re.ASCII | re.IGNORECASE)
 _CHUNK = 1 << 14  # rows that are turned into text at a time
+_FEW = 1000  # names among which a misspelt one is looked for
+_RATE, _GAP, _GAPS = 0.05, 1.5, 0.01  # of dt: by how much the usual step may differ, what is a gap; how many may be
 _ODD = re.compile(r"[^0-9eE.+\-naNA]")
 
 
@@ -119,7 +123,7 @@ def _cells(path: Path, source: str) -> tuple[list[str], list[list[str]], list[in
         raise KfgenError(f"{source}: not a CSV file (not UTF-8 text)") from None
     except csv.Error as error:
         raise KfgenError(f"{source}:{reader.line_num}: not a CSV file ({error})") from None
-    doubled = sorted({name for name in header if name and header.count(name) > 1})
+    doubled = sorted(name for name, times in Counter(header).items() if name and times > 1)
     if doubled:
         raise KfgenError(f"{source}:1: column `{doubled[0]}` occurs twice")
     return header, rows, lines
@@ -130,12 +134,48 @@ def _require(known: Collection[str], needed: Sequence[str], source: str) -> None
     if not missing:
         return
     text = f"{source}: column {', '.join(f'`{name}`' for name in missing)} is missing"
-    close = [name for each in missing for name in get_close_matches(each, list(known), 1)]
+    some = list(islice(known, _FEW))
+    close = [name for each in missing[:_FEW] for name in get_close_matches(each, some, 1)]
     if len(known) == 1 and re.search(r"[;\t]", next(iter(known))):
         text += "; the columns must be separated by commas"
     elif close:
         text += f"; did you mean `{close[0]}`?"
-    raise KfgenError(f"{text} (the log has: {', '.join(known) or 'nothing'})")
+    raise KfgenError(f"{text} (the log has: {listed(known) or 'nothing'})")
+
+
+def listed(names: Collection[str], most: int = 40) -> str:
+    """Names for a message; of very many the first."""
+    more = f", and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(name[:80] for name in islice(names, most)) + more
+
+
+def check_rate(log: Log, dt: float) -> None:
+    """Whether the rows of a log are steps of a filter with a fixed dt in s, those of equal t one step.
+
+    KfgenError where t falls, where the usual step is not dt, or where rows are missing; a log without t passes.
+    """
+    if "t" not in log.columns or log.rows < 2:
+        return
+    steps = np.diff(log.columns["t"])
+    cure = "resample the log, let dt be an argument (dt: {nominal: ...}), or run it all the same with --any-rate"
+    fallen = np.flatnonzero(steps < 0)
+    if fallen.size:
+        row = int(fallen[0]) + 1
+        before = log.columns["t"][row - 1]
+        raise KfgenError(f"{log.source}: t falls in row {row + 1}, from {before:g}; sort the rows by t")
+    steps = steps[steps != 0]
+    if not steps.size:
+        return
+    usual = float(np.median(steps))
+    if abs(usual - dt) > _RATE * dt:
+        units = "; is t in milliseconds? It is in seconds" if abs(usual - 1000 * dt) <= _RATE * 1000 * dt else ""
+        raise KfgenError(f"{log.source}: the usual step of t is {usual:g} s, but dt is {dt:g} s{units}; {cure}")
+    gaps = int(np.count_nonzero(steps > _GAP * dt))
+    if gaps > _GAPS * steps.size:
+        raise KfgenError(
+            f"{log.source}: {gaps} of {steps.size} steps of t are longer than {_GAP:g} dt (the longest "
+            f"{steps.max():g} s, dt is {dt:g} s): rows are missing, and one prediction stands for several; {cure}"
+        )
 
 
 def _column(name: str, index: int, rows: Sequence[Sequence[str]], lines: Sequence[int], source: str) -> Array:

@@ -1350,3 +1350,4 @@ void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[49])
         }
     }
 }
+/* kfgen: body 999efe2af663e5dcf2900781616cf8c2 */

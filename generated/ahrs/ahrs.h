@@ -179,3 +179,4 @@ void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[49]);
 #endif
 
 #endif
+/* kfgen: body 8e3e323cd533ffe612a8d07bd593f7a9 */

@@ -300,3 +300,4 @@ void battery_get_covariance(const battery_t *kf, battery_real_t P[9])
         }
     }
 }
+/* kfgen: body 910c8a1069a44483c947b602473f9f6e */

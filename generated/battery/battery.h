@@ -138,3 +138,4 @@ void battery_get_covariance(const battery_t *kf, battery_real_t P[9]);
 #endif
 
 #endif
+/* kfgen: body c5a66baef70c8551d19f4e682c8659b5 */

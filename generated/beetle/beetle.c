@@ -1039,3 +1039,4 @@ void beetle_get_covariance(const beetle_t *kf, beetle_real_t P[16])
         }
     }
 }
+/* kfgen: body e5453c7041d3a8970f1227f93c5d94a7 */

@@ -170,3 +170,4 @@ void beetle_get_covariance(const beetle_t *kf, beetle_real_t P[16]);
 #endif
 
 #endif
+/* kfgen: body d6eb433561085ef7ddee8dc2085ebba5 */

@@ -348,3 +348,4 @@ void cv2d_get_covariance(const cv2d_t *kf, cv2d_real_t P[16])
         }
     }
 }
+/* kfgen: body 72f7183a3eb481d7371c71a5cb5213fb */

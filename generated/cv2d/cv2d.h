@@ -141,3 +141,4 @@ void cv2d_get_covariance(const cv2d_t *kf, cv2d_real_t P[16]);
 #endif
 
 #endif
+/* kfgen: body 94ca7c42878626263c9898359a16da14 */

@@ -307,3 +307,4 @@ void cv4_get_covariance(const cv4_t *kf, cv4_real_t P[16])
         }
     }
 }
+/* kfgen: body 15accf3d9b23c256c5957b0d6a38d457 */

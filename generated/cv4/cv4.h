@@ -134,3 +134,4 @@ void cv4_get_covariance(const cv4_t *kf, cv4_real_t P[16]);
 #endif
 
 #endif
+/* kfgen: body ed3ae06fac2a23f259d94501a7b6407d */

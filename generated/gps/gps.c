@@ -498,3 +498,4 @@ void gps_get_covariance(const gps_t *kf, gps_real_t P[25])
         }
     }
 }
+/* kfgen: body 3ecec075c5aeefbf9c4ad023ce0f4ad7 */

@@ -158,3 +158,4 @@ void gps_get_covariance(const gps_t *kf, gps_real_t P[25]);
 #endif
 
 #endif
+/* kfgen: body 3738fdb775c81ce1f511218e29d11023 */

@@ -1493,3 +1493,4 @@ void maneuver_get_covariance(const maneuver_t *kf, maneuver_real_t P[36])
         }
     }
 }
+/* kfgen: body 9cdcb8a75d0542cac42480fde379c21d */

@@ -175,3 +175,4 @@ void maneuver_get_covariance(const maneuver_t *kf, maneuver_real_t P[36]);
 #endif
 
 #endif
+/* kfgen: body ab5d2aacb307806ef234c9baeffc9c1d */

@@ -472,3 +472,4 @@ void pendulum_get_sqrt_covariance(const pendulum_t *kf, pendulum_real_t S[4])
         }
     }
 }
+/* kfgen: body add79410bca98f2e1ab537e3020c6c33 */

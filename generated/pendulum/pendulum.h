@@ -150,3 +150,4 @@ void pendulum_get_sqrt_covariance(const pendulum_t *kf, pendulum_real_t S[4]);
 #endif
 
 #endif
+/* kfgen: body a4e73f17827c466ace58b7dac51b4f19 */

@@ -128,3 +128,4 @@ void scalar_get_covariance(const scalar_t *kf, scalar_real_t P[1])
         }
     }
 }
+/* kfgen: body 9056922a20c6641f66d3abf45ec8267f */

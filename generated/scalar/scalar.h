@@ -124,3 +124,4 @@ void scalar_get_covariance(const scalar_t *kf, scalar_real_t P[1]);
 #endif
 
 #endif
+/* kfgen: body 68a88c06ab81399942e297ce550dcb19 */

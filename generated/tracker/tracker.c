@@ -567,3 +567,4 @@ void tracker_get_covariance(const tracker_t *kf, tracker_real_t P[16])
         }
     }
 }
+/* kfgen: body 7f4bc8b94631d1d9dcf8bf9342a67ba7 */

@@ -152,3 +152,4 @@ void tracker_get_covariance(const tracker_t *kf, tracker_real_t P[16]);
 #endif
 
 #endif
+/* kfgen: body 73fafa6c20679761c27d3edc68b2cfa3 */

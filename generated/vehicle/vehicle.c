@@ -592,3 +592,4 @@ void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25])
         }
     }
 }
+/* kfgen: body 44cb51002c56bd4604dc93075b2b71dd */

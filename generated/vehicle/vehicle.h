@@ -173,3 +173,4 @@ void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25]);
 #endif
 
 #endif
+/* kfgen: body da8d90da3027fdb80f738fde55279e52 */

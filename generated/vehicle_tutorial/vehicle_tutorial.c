@@ -336,3 +336,4 @@ void vehicle_tutorial_get_covariance(const vehicle_tutorial_t *kf, vehicle_tutor
         }
     }
 }
+/* kfgen: body 2fee49a2cf310db0d59a27a19d9f4c33 */

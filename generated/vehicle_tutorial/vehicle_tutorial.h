@@ -142,3 +142,4 @@ void vehicle_tutorial_get_covariance(const vehicle_tutorial_t *kf, vehicle_tutor
 #endif
 
 #endif
+/* kfgen: body 08241045401b792de2f36a4638b46f5a */

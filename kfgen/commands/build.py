@@ -17,6 +17,7 @@ from kfgen.commands.tables import Notes, Part, Paths, Table, show
 from kfgen.errors import KfgenError, Mistake, SpecError
 from kfgen.layouts import Package, arrange, layouts
 from kfgen.scalar_names import is_fixed
+from kfgen.seal import is_edited, is_same, sealed
 
 if TYPE_CHECKING:
     from kfgen.generate import Generated
@@ -61,6 +62,7 @@ class Built:
     "--log", type=click.Path(path_type=Path), metavar="LOG.csv",
     help="A log whose ranges a fixed-point filter is to hold, beside those of simulated runs.",
 )  # fmt: skip
+@click.option("--force", is_flag=True, help="Also write over files that were edited by hand, or are not kfgen's.")
 @click.option(
     "--selftest", is_flag=True,
     help="Also write <name>_selftest.c, which replays a recorded run: <name>_selftest() is 0 where the filter works.",
@@ -77,10 +79,12 @@ def build(
     log: Path | None,
     selftest: bool,
     layout: str,
+    force: bool,
 ) -> None:
     """Write the C files of one or more specs to DIR/<name>/, and print what they take.
 
-    All specs are checked before anything is written.
+    All specs are checked before anything is written. A file that is as it would be written is left untouched; one that
+    was edited since it was written is refused. In the last line of each stands the hash of its body.
     """
     built = generate_all(specs, directory, scalar, selftest, layout, log)
     _warn(built)
@@ -88,7 +92,7 @@ def build(
         sys.exit(1 if report_differences(built) else 0)
     from kfgen.files import write_all
 
-    write_all({path: text for each in built for path, text in each.files.items()})
+    write_all(changed({path: text for each in built for path, text in each.files.items()}, force))
     show(*report(built))
 
 
@@ -128,6 +132,7 @@ def generate_all(
                     texts |= recorded(spec, generated)
                 if layout != "plain":
                     texts = arrange(layout, _package(spec, generated, texts, layout))
+                texts = {name: sealed(name, text) for name, text in texts.items()}
                 built.append(Built(spec, generated, texts, directory / spec.name))
             except SpecError as error:
                 mistakes += error.mistakes
@@ -173,22 +178,53 @@ def _warn(built: Sequence[Built]) -> None:
             click.echo(f"warning: {warning}", err=True)
 
 
+def changed(files: Mapping[Path, str], force: bool) -> dict[Path, str]:
+    """Those of the files that the disk does not hold as they are. KfgenError names those on it that were edited."""
+    out: dict[Path, str] = {}
+    edited: list[Path] = []
+    for path, text in files.items():
+        old = _on_disk(path)
+        if old == text:
+            continue
+        out[path] = text
+        if old is not None and is_edited(old):
+            edited.append(path)
+    if edited and not force:
+        listed = "\n".join(f"  {path}" for path in edited)
+        raise KfgenError(
+            "edited by hand since kfgen wrote them, or not written by kfgen:\n"
+            f"{listed}\nnothing is written; move the changes elsewhere, or write over them with --force"
+        )
+    return out
+
+
+def _on_disk(path: Path) -> str | None:
+    try:
+        return path.read_bytes().decode("utf-8", "surrogateescape")
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
+        return None  # what cannot be written is told by who writes
+
+
 def report_differences(built: Sequence[Built]) -> int:
-    """Print a unified diff from the disk to what would be written; the number of files that differ."""
+    """Print a unified diff from the disk to what would be written; the number of files that differ.
+
+    Files that differ in their stamp or line ends alone are named, and do not count.
+    """
     count = 0
     for each in built:
         for path, text in each.files.items():
-            try:
-                old = path.read_bytes().decode("utf-8", "replace")
-            except FileNotFoundError:
-                old = None
+            old = _on_disk(path)
             if old == text:
+                continue
+            if old is not None and is_same(old, text):
+                click.echo(f"kfgen: {path} differs in its stamp or line ends alone", err=True)
                 continue
             count += 1
             before = "/dev/null" if old is None else str(path)
             # split at line feeds only: a carriage return on the disk is a difference, not a line end
             lines = difflib.unified_diff(_lines(old or ""), _lines(text), before, f"{path} (would be written)")
-            click.echo("".join(line if line.endswith("\n") else f"{line}\n" for line in lines), nl=False)
+            shown = "".join(line if line.endswith("\n") else f"{line}\n" for line in lines)
+            click.echo(shown.encode("utf-8", "replace").decode(), nl=False)
     if count:
         click.echo(f"kfgen: {count} file{'s differ' if count > 1 else ' differs'}; run `kfgen build`", err=True)
     return count

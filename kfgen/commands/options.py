@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+
+from kfgen.errors import KfgenError
 
 if TYPE_CHECKING:
     from kfgen.spec.types import Spec
@@ -24,6 +28,25 @@ def load_spec(path: Path, scalar: str | None = None) -> Spec:
     from kfgen.spec import load
 
     return override(load(path), scalar)
+
+
+def keep_apart(read: Mapping[str, Path], written: Mapping[str, Path | None]) -> None:
+    """KfgenError where a command would write over what it reads, or write two things to one file. By what they are."""
+    known = list(read.items())
+    for option, path in written.items():
+        if path is None:
+            continue
+        for what, other in known:
+            if _same(path, other):
+                raise KfgenError(f"{path}: {option} would overwrite {what}; name another file")
+        known.append((f"what {option} writes", path))
+
+
+def _same(a: Path, b: Path) -> bool:
+    """Whether two paths lead to one file, by whatever links; what is no file (/dev/null) is never one."""
+    if a.exists() and b.exists():
+        return a.is_file() and a.samefile(b)
+    return os.path.realpath(a) == os.path.realpath(b)
 
 
 def example(*lines: str) -> str:

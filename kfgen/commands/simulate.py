@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from kfgen.commands.options import example, load_spec, spec_argument
+from kfgen.commands.options import example, keep_apart, load_spec, spec_argument
 
 
 def _rates(ctx: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> dict[str, int]:
@@ -43,4 +43,5 @@ def simulate(spec: Path, out: Path, steps: int, seed: int, every: dict[str, int]
     from kfgen import simulate as simulation
     from kfgen.logs import write
 
+    keep_apart({"the spec": spec}, {"-o": out})
     write(out, simulation.simulate(load_spec(spec), steps, seed, every).columns)

@@ -22,7 +22,8 @@ from pathlib import Path
 from typing import Protocol
 
 from kfgen.errors import KfgenError
-from kfgen.native.compiler import cache_directory
+from kfgen.native.cache import cache_directory
+from kfgen.native.compiler import zig_environment
 
 FLAGS = ("-O2", "-std=gnu99", "-fno-math-errno", "-ffunction-sections", "-fdata-sections")
 
@@ -182,12 +183,14 @@ def has_zig() -> bool:
 
 def zig(folder: Path, *arguments: str) -> None:
     """One of the tools of ziglang."""
-    run(folder, sys.executable, "-m", "ziglang", *arguments)
+    run(folder, sys.executable, "-m", "ziglang", *arguments, environment=zig_environment(cache_directory()))
 
 
-def run(folder: Path, *command: str) -> None:
+def run(folder: Path, *command: str, environment: Mapping[str, str] | None = None) -> None:
     """Run a tool; KfgenError holds its messages."""
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, errors="replace", check=False, env=environment
+    )
     if done.returncode:
         messages = "\n".join(done.stderr.rstrip().splitlines()[:30])
         raise KfgenError(f"{Path(command[0]).name} failed: {' '.join(command)}\n{messages}")

@@ -42,7 +42,7 @@ class _Naming:
     def __init__(self, body: list[Statement], entries: Mapping[Place, Entry], taken: Set[str], prefix: str) -> None:
         self.entries = entries
         self.prefix = f"{prefix}_"
-        self.taken = taken | {s.name for s in walk(body) if isinstance(s, Let | Declare)}
+        self.taken = {*taken, *(s.name for s in walk(body) if isinstance(s, Let | Declare))}
         self.bound: dict[Place, Node] = {}  # the locals that hold entries
         self.gone: set[Place] = set()  # entries that were written: what is read there now is another value
         self.held: dict[str, Place] = {}  # numbered locals that the program holds entries in -> the entry
@@ -128,5 +128,5 @@ class _Naming:
         while name in self.taken or (count == 0 and name.startswith(self.prefix)):
             count += 1
             name = f"{base}_{count}"
-        self.taken |= {name}
+        self.taken.add(name)
         return name

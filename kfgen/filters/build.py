@@ -16,7 +16,7 @@ from kfgen.filters import kinds, sigma
 from kfgen.filters.algebra.numbers import is_zero
 from kfgen.filters.bank.imm import Imm
 from kfgen.filters.base import FilterCode
-from kfgen.filters.choice import choose, told, with_privates
+from kfgen.filters.choice import choose, mixed, told, with_privates
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.forms import Choice, looped, straight
 from kfgen.filters.covariance.kernels.function import Kernels
@@ -34,6 +34,7 @@ from kfgen.ir.trace import Trace
 from kfgen.model import Model, build_model
 from kfgen.model.bank import build_bank
 from kfgen.scalars import Scalar
+from kfgen.spec.constants import value
 from kfgen.spec.types import Spec
 
 
@@ -66,12 +67,24 @@ def _unrolled_or_not(spec: Spec, scalar: Scalar, emitted: Emitter) -> FilterCode
     chosen = spec.code
     if spec.filter.gain is not None or not scalar.uniform:
         return emitted("auto")
+    if chosen.unroll_by:
+        asked = {how: {name for name, own in chosen.unroll_by.items() if own == how} for how in ("full", "none")}
+        straight = emitted("auto")
+        if asked["full"]:
+            straight = mixed(straight, emitted("full"), asked["full"])
+        return choose(straight, emitted("none"), chosen.flash, asked["none"], asked["full"], _rates(spec), scalar.name)
     if chosen.flash is None:
         code = emitted(chosen.unroll)
         return told(code, {f.name for f in code.functions}) if chosen.unroll == "none" else code
     straight = emitted(chosen.unroll)
     looped = emitted("none") if chosen.unroll == "auto" else straight
-    return choose(straight, looped, chosen.flash, chosen.unroll == "none", scalar.name)
+    names = {f.name for f in straight.functions} if chosen.unroll == "none" else set()
+    return choose(straight, looped, chosen.flash, names, set(), _rates(spec), scalar.name)
+
+
+def _rates(spec: Spec) -> dict[str, float]:
+    """Function -> its calls a prediction."""
+    return {f"update_{s.name}": float(value(s.rate.tree, spec)) for s in spec.measurements if s.rate is not None}
 
 
 def _single(spec: Spec, scalar: Scalar, taken: frozenset[str]) -> Emitter:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 from kfgen.filters.base import FilterCode
@@ -19,22 +19,34 @@ LOOPING = (
 )
 
 
-def choose(straight: FilterCode, looped: FilterCode, budget: int, loops: bool, scalar: str) -> FilterCode:
+def choose(
+    straight: FilterCode, looped: FilterCode, budget: int | None, loops: Collection[str], unrolled: Collection[str],
+    rates: Mapping[str, float], scalar: str,
+) -> FilterCode:  # fmt: skip
     """The functions of two forms of a filter, loops where straight-line code would exceed the budget in bytes.
 
-    Those that save most become loops first; none does that saves nothing. loops: all of them are. Where nothing is
-    sure to fit, all become loops if loops are what is smaller, so that `auto` then takes what `none` takes. Whether it
-    is predicted to exceed the budget is told by whoever judges budgets.
+    What is called least becomes loops first, of equals what saves most; nothing does that saves nothing, and what in
+    the end need not be loops is not. loops, unrolled: functions that are these in any case. rates: calls a prediction,
+    where they are not 1. Where nothing is sure to fit, all become loops if loops are what is smaller, so that `auto`
+    then takes what `none` takes. Whether it is predicted to exceed the budget is told by whoever judges budgets.
     """
-    names = [f.name for f in straight.functions if _counted(f)]
+    names = [f.name for f in straight.functions if _counted(f) and _unmasked(f.name) not in unrolled]
     everything = set(names)
-    rolled = everything if loops else set[str]()
+    rolled = forced = {name for name in names if _unmasked(name) in loops}
+    if budget is None:
+        return mixed(straight, looped, rolled)
 
     def flash(chosen: set[str]) -> int:
-        functions = with_privates(_mixed(straight, looped, chosen)).functions
+        functions = with_privates(mixed(straight, looped, chosen)).functions
         return predicted([f for f in functions if f.private or f.name == "init" or _counted(f)], scalar)
 
-    while flash(rolled) * MARGIN > budget:
+    def rate(name: str) -> float:
+        return rates.get(_unmasked(name), 1.0)
+
+    def fits(chosen: set[str]) -> bool:
+        return flash(chosen) * MARGIN <= budget
+
+    while not fits(rolled):
         found = flash(rolled)
         sizes = {name: flash(rolled | {name}) for name in names if name not in rolled}
         smaller = {name: size for name, size in sizes.items() if size < found}
@@ -42,10 +54,19 @@ def choose(straight: FilterCode, looped: FilterCode, budget: int, loops: bool, s
             if flash(everything) < found:
                 rolled = everything
             break
-        rolled = rolled | {min(smaller, key=lambda name: smaller[name])}
-    if flash(rolled) * MARGIN > budget and flash(everything) <= flash(set()):
+        rolled = rolled | {min(smaller, key=lambda name: (rate(name), smaller[name]))}
+    if fits(rolled):
+        for name in sorted(rolled - forced, key=lambda name: (-rate(name), names.index(name))):
+            if fits(rolled - {name}):
+                rolled = rolled - {name}
+    elif flash(everything) <= flash(forced):
         rolled = everything
-    return _mixed(straight, looped, rolled)
+    return mixed(straight, looped, rolled)
+
+
+def _unmasked(name: str) -> str:
+    """The function that a masked update goes with."""
+    return name.removesuffix("_masked") if name.startswith("update_") else name
 
 
 def told(code: FilterCode, rolled: Collection[str]) -> FilterCode:
@@ -73,7 +94,7 @@ def with_privates(code: FilterCode) -> FilterCode:
     return replace(code, functions=tuple(out))
 
 
-def _mixed(straight: FilterCode, looped: FilterCode, rolled: set[str]) -> FilterCode:
+def mixed(straight: FilterCode, looped: FilterCode, rolled: set[str]) -> FilterCode:
     """Functions by name from either. Where all that is called in a step is loops, the rest is what goes with these."""
     if all(f.name in rolled for f in straight.functions if _counted(f)):
         return told(looped, rolled)

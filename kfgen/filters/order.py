@@ -10,7 +10,7 @@ from itertools import permutations
 
 ELEMENT, FRESH, PIVOT = 4, 3, 9  # relative costs of an element of U met again, met first, and of a pivot
 EXHAUSTIVE = 5  # up to this many states every order is tried
-EVALUATIONS = 2500
+EVALUATIONS = 2500  # of at most 32 states; of more so many fewer as each takes longer
 
 
 def best_order(F: list[set[int]], noisy: set[int], measured: list[set[int]]) -> list[int]:
@@ -26,7 +26,7 @@ def best_order(F: list[set[int]], noisy: set[int], measured: list[set[int]]) -> 
         return min((list(p) for p in permutations(range(n))), key=lambda p: (cost(p), p))
     best = min((list(range(n)), list(reversed(range(n)))), key=cost)
     best_cost = cost(best)
-    left = EVALUATIONS
+    left = EVALUATIONS * 1024 // max(1024, n * n)
     improved = True
     while improved and left > 0:
         improved = False

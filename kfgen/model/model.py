@@ -15,7 +15,7 @@ from kfgen.geometry import Part, part_of
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
 from kfgen.model.options import INNOVATION, Options, build_options
-from kfgen.model.symbolic import to_sympy
+from kfgen.model.symbolic import constants, partials, to_sympy
 from kfgen.spec.tree import Expression
 from kfgen.spec.types import Matrix, Noise, Sensor, Spec
 
@@ -102,8 +102,7 @@ class Model:
         """(symbol, derivative) of an expression for every symbol on which it depends."""
         found = self._partials.get(expression)
         if found is None:
-            pairs = ((s, expression.diff(s)) for s in sorted(expression.free_symbols, key=lambda s: s.name))
-            found = self._partials[expression] = tuple((s, d) for s, d in pairs if d != 0)
+            found = self._partials[expression] = partials(expression)
         return found
 
     def uses(self, *expressions: Symbolic) -> set[str]:
@@ -155,8 +154,7 @@ class _Builder:
 
     def build(self) -> Model:
         spec = self.spec
-        for constant in spec.constants:
-            self.names[constant.name] = self.tree(constant.value)
+        self.names |= constants(spec.constants, lambda e: self.lowering(e).constant)
         # a fixed step and initial values may use parameters: at their spec values
         parameters = [(p.name, self.number(p.value)) for p in spec.parameters]
         folded = {

@@ -2,27 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from fractions import Fraction
 from typing import Any
 
 import sympy
 
 from kfgen.model import functions as kf
-from kfgen.spec.tree import Call, Name, Number, Tree
+from kfgen.spec.tree import Call, Name, Number, Tree, names
+from kfgen.spec.types import Constant
+
+_LONG = 50  # names in a constant, those in the constants that it uses counted with them
 
 
-def to_sympy(tree: Tree, names: Mapping[str, Any]) -> Any:
-    """The SymPy expression of a tree; names maps every name of it to an expression."""
+def to_sympy(tree: Tree, known: Mapping[str, Any]) -> Any:
+    """The SymPy expression of a tree; known maps every name of it to an expression."""
     if isinstance(tree, Number):
         return sympy.Rational(tree.value.numerator, tree.value.denominator)
     if isinstance(tree, Name):
         if tree.name == "pi":
             return sympy.pi
-        if tree.name == "e" and "e" not in names:
+        if tree.name == "e" and "e" not in known:
             return sympy.E
-        return names[tree.name]
+        return known[tree.name]
     assert isinstance(tree, Call)
-    return _CALLS[tree.op](*[to_sympy(argument, names) for argument in tree.args])
+    return _CALLS[tree.op](*[to_sympy(argument, known) for argument in tree.args])
+
+
+def constants(entries: Iterable[Constant], value: Callable[[Any], Fraction | None]) -> dict[str, Any]:
+    """The constants of a spec as they are written; one with others written into it that is long by now, as its
+    `value`: each that uses two of the one before would double the algebra."""
+    found: dict[str, Any] = {}
+    sizes: dict[str, int] = {}
+    for entry in entries:
+        parts = list(names(entry.value.tree))
+        sizes[entry.name] = len(parts) + sum(sizes.get(part, 0) for part in parts)
+        found[entry.name] = to_sympy(entry.value.tree, found)
+        number = value(found[entry.name]) if sizes[entry.name] > _LONG else None
+        if number is not None:
+            sizes[entry.name] = 0
+            found[entry.name] = sympy.Rational(number.numerator, number.denominator)
+    return found
+
+
+def partials(expression: Any) -> tuple[tuple[Any, Any], ...]:
+    """(symbol, derivative) for every symbol on which an expression depends, by name. Of a sum term by term, each by the
+    symbols that it has: a sum of many terms in many symbols is seen once, not once a symbol."""
+    found: dict[Any, list[Any]] = {}
+    for term in sympy.Add.make_args(expression):
+        for symbol in term.free_symbols:
+            found.setdefault(symbol, []).append(term.diff(symbol))
+    pairs = ((s, sympy.Add(*found[s])) for s in sorted(found, key=lambda s: s.name))
+    return tuple((s, d) for s, d in pairs if d != 0)
 
 
 def _power(base: Any, exponent: Any) -> Any:

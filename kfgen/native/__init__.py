@@ -73,16 +73,20 @@ def load_filters(filters: Sequence[Emitted], *, flags: Sequence[str] | None = No
         texts |= wanted
         texts[f"{name}_kfgen_run.c"] = driver.source(each.spec, each.declarations)
     library = str(build(texts, flags))
-    return [_load(each.spec, each.declarations, library) for each in filters]
+    for again in (False, True):
+        try:
+            return [_load(each.spec, each.declarations, library) for each in filters]
+        except OSError as error:  # built on another machine, perhaps, that shares the cache
+            if again:
+                raise KfgenError(f"the compiled filter {filters[0].spec.name} could not be loaded: {error}") from None
+            library = str(build(texts, flags, afresh=True))
+    raise AssertionError
 
 
 def _load(spec: Spec, declared: Declarations, library: str) -> NativeFilter:
     ffi = cffi.FFI()
     ffi.cdef(declared.text + "\n" + driver.declarations(spec.name))
-    try:
-        lib = ffi.dlopen(library)
-    except OSError as error:
-        raise KfgenError(f"the compiled filter {spec.name} could not be loaded: {error}") from None
+    lib = ffi.dlopen(library)
     seen, compiled = ffi.sizeof(f"{spec.name}_t"), getattr(lib, f"{spec.name}_kfgen_size")()
     if seen != compiled:  # going on would corrupt memory
         raise KfgenError(f"{spec.name}_t has {compiled} bytes in C, but {seen} as it is declared")

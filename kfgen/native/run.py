@@ -51,6 +51,14 @@ class RunResult:
         return found
 
 
+    @property
+    def failed(self) -> bool:
+        """Whether there were updates, and each of them returned an error."""
+        updates = [status for function, status in self.calls.items() if function != "predict"]
+        any_error = any(bool((status >= ERROR).any()) for status in updates)
+        return any_error and all(bool(np.isnan(nis).all()) for nis in self.nis.values())
+
+
 @dataclass(frozen=True)
 class Plan:
     """What is to be done in each row; float64, physical.
@@ -71,7 +79,8 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
     """The rows of a log as calls of a filter.
 
     Per row: predict, then the updates in the spec's order. Run-time dt: t minus the t of the row before; no
-    predict in the first row and where t is equal. Fixed dt (`dt` gives it in s for `t`): one predict per row.
+    predict in the first row and where t is equal. Fixed dt (`dt` gives it in s for `t`): one predict per row, none
+    where there is a t and it is that of the row before.
     A sensor is updated where all its components are there; with `partial: true` the components that are there
     are used, otherwise a half-filled row of a sensor is no measurement. An empty input keeps the value of the
     row before; an input that is empty in the first row is a KfgenError.
@@ -85,6 +94,8 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
     else:
         t = columns["t"] if "t" in columns else np.arange(1.0, rows + 1) * (dt or 1.0)
         difference, step = np.zeros(rows), np.ones(rows, dtype=bool)
+        if "t" in columns and spec.dt is not None:
+            step[1:] = np.diff(t) != 0
     u = np.empty((rows, len(spec.inputs)))
     for i, each in enumerate(spec.inputs):
         u[:, i] = _held(columns[each.name], each.name, log.source)
@@ -117,7 +128,7 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
     called with (rows done, rows) now and then. KfgenError for a log that does not fit the spec.
     """
     log = as_log(source, spec)
-    work = plan(spec, log, _fixed_step(spec))
+    work = plan(spec, log, fixed_step(spec))
     rows, n, sensors = log.rows, len(spec.states), len(spec.measurements)
     modes = len(spec.imm.modes) if spec.imm else 0
     scalar, units = struct.value, struct.units
@@ -195,7 +206,7 @@ def _refuse(work: Plan, arrays: Mapping[str, NDArray[Any]], spec: Spec) -> None:
         first = last
 
 
-def _fixed_step(spec: Spec) -> float:
+def fixed_step(spec: Spec) -> float:
     """A fixed dt in s, 0 without one."""
     if spec.dt is None or spec.dt.run_time:
         return 0.0

@@ -35,13 +35,14 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
 
     The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`) to values, NaN where there is no
     measurement. Run-time dt: t minus the last row's t, no predict in the first row and for equal t; fixed dt:
-    one predict per row. A sensor with missing components is updated with the others where it is `partial`,
-    and not at all where it is not. Raises ValueError for a missing column (all columns of a sensor may be
-    missing).
+    one predict per row, where there is a t none for equal t. A sensor with missing components is updated with the
+    others where it is `partial`, and not at all where it is not. Raises ValueError for a missing column (all columns
+    of a sensor may be missing).
     """
     columns = {name: np.asarray(column, dtype=np.float64) for name, column in log.items()}
     rows = len(next(iter(columns.values()), ()))
     run_time = kf.spec.dt is not None and kf.spec.dt.run_time
+    fixed = kf.spec.dt is not None and not run_time and "t" in columns
     needed = [*kf.model.inputs, *(["t"] if run_time else [])]
     missing = [name for name in needed if name not in columns]
     if missing:
@@ -71,7 +72,7 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
                 status |= kf.predict(u, t - last)
             if math.isfinite(t):
                 last = t
-        else:
+        elif not (fixed and row and columns["t"][row] == columns["t"][row - 1]):
             status |= kf.predict(u)
         for name, reading in readings.items():
             status |= _measure(kf, name, reading[row], u, result, row)

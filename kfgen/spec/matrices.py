@@ -40,6 +40,23 @@ def is_semidefinite(rows: Rows) -> bool:
         return _eliminate(a)
 
 
+def worst_pair(rows: Rows) -> tuple[int, int] | None:
+    """The pair whose correlation is farthest beyond 1, of a symmetric matrix; None where there is none, or a variance
+    is negative: then it takes more than two to break it."""
+    with mpmath.workdps(_DIGITS):
+        a = [[real(entry) for entry in row] for row in rows]
+        if any(a[i][i] < 0 for i in range(len(a))):
+            return None
+        found, worst = None, mpmath.mpf(1 + _TOLERANCE)
+        for i in range(len(a)):
+            for j in range(i + 1, len(a)):
+                product = mpmath.sqrt(a[i][i] * a[j][j])
+                beyond = abs(a[i][j]) / product if product else mpmath.inf if a[i][j] else 0
+                if beyond > worst:
+                    found, worst = (i, j), beyond
+        return found
+
+
 def _eliminate(a: list[list[Any]]) -> bool:
     """Cholesky with the largest pivot first, of a matrix of correlations."""
     left = [i for i in range(len(a)) if a[i][i] != 0]

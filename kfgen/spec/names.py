@@ -20,8 +20,8 @@ STATUS = (
 )  # fmt: skip
 
 
-def wrong_name(name: str) -> tuple[str, str] | None:
-    """What is wrong with a name, and what to write instead."""
+def wrong_name(name: str, in_expressions: bool = True) -> tuple[str, str] | None:
+    """What is wrong with a name, and what to write instead. in_expressions: not for sensors, components, the filter."""
     if len(name) > MAX_NAME:
         return f"the name {short(name)} is longer than {MAX_NAME} characters", "choose a shorter one"
     if name.startswith("_"):
@@ -29,7 +29,7 @@ def wrong_name(name: str) -> tuple[str, str] | None:
     if not _IDENTIFIER.match(name):
         hint = "use ASCII letters, digits and underscores, beginning with a letter"
         return f"the name {short(name)} is not a C identifier", hint
-    why = reserved(name)
+    why = reserved(name, in_expressions)
     return (f"the name `{name}` {why}", f"choose another one, such as `{name}_` or `{name}0`") if why else None
 
 
@@ -40,7 +40,7 @@ STANDARD_TYPES = re.compile(
 
 
 def check_name(name: str, place: Place, problems: Problems, headers: bool = False) -> None:
-    wrong = wrong_name(name)
+    wrong = wrong_name(name, in_expressions=not headers)
     if wrong is None and headers and name.lower() in C_HEADERS:
         wrong = f"the name `{name}` is that of a standard header ({name.lower()}.h)", "choose another one"
     if wrong is None and headers and STANDARD_TYPES.fullmatch(name):
@@ -120,6 +120,8 @@ def check_identifiers(spec: Spec, problems: Problems) -> None:
         other, other_what, other_place = seen[key]
         if other_what == what:
             continue  # the same name twice, which has been reported
+        if name != other and (name.endswith("_t") or other.endswith("_t")):
+            continue  # C tells a type from an index: a temperature is T everywhere
         at = place if place.line >= other_place.line else other_place
         text = f"the emitted `{name}` ({what}) and `{other}` ({other_what}) are equal in upper case"
         problems.add(at, text, "rename one of them")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
 
 from kfgen.errors import Mistake, Place, SpecError
@@ -42,6 +43,13 @@ def printable(text: str) -> str:
     """Text for one line of a message: no line breaks, no control characters, of bounded length."""
     text = "".join(c if c.isprintable() else " " for c in text)
     return text if len(text) <= 400 else text[:397] + "..."
+
+
+def unseen(text: str) -> str | None:
+    """The first character of a text that a reader cannot see: a control or format character (one of those that turn the
+    direction of writing makes a comment look like code), a line separator of Unicode, half a surrogate pair."""
+    odd = (c for c in text if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") and c not in "\n\r\t")
+    return next(odd, None)
 
 
 def short(text: str, limit: int = 40) -> str:

@@ -62,7 +62,7 @@ ARDUINO_MACROS = _words(
     """
     HIGH LOW INPUT OUTPUT INPUT_PULLUP INPUT_PULLDOWN OUTPUT_OPENDRAIN OPEN_DRAIN ANALOG PULLUP PULLDOWN
     PI HALF_PI TWO_PI DEG_TO_RAD RAD_TO_DEG EULER SERIAL DISPLAY LSBFIRST MSBFIRST CHANGE FALLING RISING
-    ONLOW ONHIGH DEFAULT EXTERNAL INTERNAL INTERNAL1V1 INTERNAL1V2 INTERNAL2V5 INTERNAL2V56
+    DEC HEX OCT BIN ONLOW ONHIGH DEFAULT EXTERNAL INTERNAL INTERNAL1V1 INTERNAL1V2 INTERNAL2V5 INTERNAL2V56
     INTERNAL2V56_EXTCAP VDD AREF abs min max round sq constrain radians degrees map bit byte word boolean
     bitRead bitSet bitClear bitToggle bitWrite lowByte highByte interrupts noInterrupts
     clockCyclesPerMicrosecond clockCyclesToMicroseconds microsecondsToClockCycles isr yield
@@ -81,7 +81,7 @@ ARDUINO_MACROS = _words(
     """
 )
 _ARDUINO_PATTERN = re.compile(
-    r"(?:B[01]{1,8}|A\d{1,2}|PIN_\w+|(?:PORT|DDR|PIN)[A-L][0-7]?|P[A-L][0-7]?|DD[A-L][0-7]|TIMER\d\w*"
+    r"(?:B[01]{1,8}|A\d{1,2}|D(?:\d|1[0-5])|DAC\d|PIN_\w+|(?:PORT|DDR|PIN)[A-L][0-7]?|P[A-L][0-7]?|DD[A-L][0-7]|TIMER\d\w*"
     r"|(?:TCCR|TCNT|OCR|TIMSK|TIFR|ICR)\d\w*|(?:UDR|UCSR|UBRR)\w*|PCMSK\d|GPIOR\d|PCINT\d+)\Z"
 )
 
@@ -96,11 +96,11 @@ C_HEADERS = _words(
 )
 
 
-def reserved(name: str) -> str | None:
-    """Why a word may not be a name of a spec, or None."""
-    if name in FUNCTIONS:
+def reserved(name: str, in_expressions: bool = True) -> str | None:
+    """Why a word may not be a name of a spec, or None. in_expressions: whether formulas can say it."""
+    if in_expressions and name in FUNCTIONS:
         return "is a function of the language"
-    if name in EXPRESSION_NAMES:
+    if in_expressions and name in EXPRESSION_NAMES:
         return "has a meaning in expressions"
     if name in C_KEYWORDS:
         return "is a keyword of C"

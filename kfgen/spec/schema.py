@@ -25,7 +25,13 @@ from kfgen.spec.schema_model import (
     STEP,
     matrix,
 )
-from kfgen.spec.shapes import Either, Formula, Items, Key, Record, Table, Text, Whole
+from kfgen.spec.shapes import Choice, Either, Formula, Items, Key, Record, Table, Text, Whole
+
+ADVICE = (
+    "alpha", "degrees", "far_origin", "init_bounds", "init_range", "loops", "no_process_noise", "precision",
+    "sigma_angle", "std_variance", "ud_cost", "unobservable", "unused", "unused_noise",
+)  # fmt: skip
+"""The names of all advice."""
 
 LET = Table("definition", Formula("f"), declares=True)
 MEASUREMENTS = Table("sensor", SENSOR, declares=True)
@@ -105,6 +111,7 @@ TOP = Record(
         Key("filter", FILTER, "What filter is built.", "an ekf with its defaults"),
         Key("fixed", FIXED, "Fixed-point choices; used with a q scalar only, allowed with any."),
         Key("code", CODE, "What the emitted code looks like, and what it may cost."),
+        Key("advice", Items(Choice(ADVICE), "names of advice"), "What `kfgen build` is not to advise."),
         Key("imm", IMM, "An interacting-multiple-model filter: several modes over the same states."),
     ),
 )

@@ -237,13 +237,16 @@ FIXED = Record(
     ),
 )
 
+_UNROLL = Choice(("auto", "full", "none"))
+
 CODE = Record(
     "code",
     (
         Key(
             "unroll",
-            Choice(("auto", "full", "none")),
-            "`none`: loops over static arrays; `auto`: loops where straight-line code would exceed `flash`. In fixed "
+            Either(scalar=_UNROLL, mapping=Table("function", _UNROLL)),
+            "`none`: loops over static arrays; `auto`: loops where straight-line code would exceed `flash`, of what is "
+            "called least first (`rate` of a sensor); or by function: `{predict: full, update_gnss: none}`. In fixed "
             "point all are one: an element of a covariance has a binary point of its own, which a loop could not have.",
             "auto",
         ),

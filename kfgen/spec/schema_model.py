@@ -215,6 +215,7 @@ SENSOR = Record(
             "The full covariance of these noise inputs, instead of std or var.",
         ),
         Key("gate", GATE, "Rejection of outliers."),
+        Key("rate", CONSTANT, "Updates a prediction, greater than 0: what budgets roll first is called least.", "1"),
         Key("partial", Flag(), "Also emit update_<sensor>_masked, for some of the components.", "false"),
         DOC,
     ),

@@ -87,7 +87,7 @@ class Scopes:
         modes = self.spec.imm.modes if self.spec.imm else ()
         taken: dict[str, dict[str, tuple[str, Place]]] = {"": {}, **{mode.name: {} for mode in modes}}
         for kind, name, place, path in self.walker.declared:
-            if (wrong := wrong_name(name)) is not None:
+            if (wrong := wrong_name(name, kind not in ("sensor", "component"))) is not None:
                 self.problems.add(place, *wrong)
                 self.doubtful.update(re.findall(r"[A-Za-z_]\w*", name, re.ASCII))
             if kind not in ("constant", "parameter", "state", "input", "noise", "definition"):
@@ -254,6 +254,8 @@ class Scopes:
                 known = states
             elif of == "sensor":
                 known = list(sensors)
+            elif of == "function":
+                known = ["predict", *(f"update_{sensor}" for sensor in sensors)]
             elif of == "component":
                 of = f"component of {initialize.sensor}" if initialize else of
                 known = sensors.get(initialize.sensor, []) if initialize else []

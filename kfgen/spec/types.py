@@ -137,6 +137,7 @@ class Sensor:
     noise_covariance: Matrix | None = None
     gate: Gate | None = None
     partial: bool = False
+    rate: Expression | None = None  # calls a prediction; None: 1
     doc: str = ""
     place: Place = NOWHERE
 
@@ -203,6 +204,7 @@ class Fixed:
 @dataclass(frozen=True)
 class Code:
     unroll: str = "auto"
+    unroll_by: Mapping[str, str] = field(default_factory=dict)  # function -> full | none | auto, in place of `unroll`
     flash: int | None = None
     ram: int | None = None
     stack: int | None = None
@@ -262,5 +264,6 @@ class Spec:
     fixed: Fixed = Fixed()
     code: Code = Code()
     imm: Imm | None = None
+    advice: tuple[str, ...] = ()  # names of the advice that is not wanted
     place: Place = NOWHERE
     places: Mapping[str, Place] = field(default_factory=dict)  # of the top-level keys that were written

@@ -13,7 +13,7 @@ from kfgen.spec.expressions import parse
 from kfgen.spec.hints import meant_key, missing_key_hint, unknown_key_hint, wanted_words
 from kfgen.spec.lexer import ExpressionError
 from kfgen.spec.nodes import Bad, Mapping, Node, Scalar, Sequence, kind_of
-from kfgen.spec.problems import Problems, did_you_mean, short
+from kfgen.spec.problems import Problems, did_you_mean, short, unseen
 from kfgen.spec.raw import BAD, Fields, Path, Word, Written, path_text
 from kfgen.spec.shapes import (
     Budget,
@@ -150,6 +150,9 @@ class Walker:
             self.wrong(node, path, "text", "write text or leave the key out")
         elif node.kind == "boolean":
             self.wrong(node, path, "text", f'quote it: "{node.text}"')
+        elif (odd := unseen(node.text)) is not None:
+            text = f"the character U+{ord(odd):04X} cannot be seen, and would stand in the header"
+            self.problems.add(self.place(node, path), text, "remove it")
         else:
             return node.text
         return None

@@ -83,6 +83,46 @@ def test_errors_of_the_filter_are_counted_on_stderr(kfgen, log):
     assert [row["status"] for row in rows_of(result.stdout)] == ["0", str(0x600), "16"]
 
 
+@pytest.mark.parametrize("path", ["log.csv", "./log.csv", "link.csv", "hard.csv", SPEC])
+def test_nothing_is_written_over_what_is_read(kfgen, log, path):
+    Path("link.csv").symlink_to("log.csv")
+    os.link("log.csv", "hard.csv")
+    before = Path(log).read_bytes(), Path(SPEC).read_bytes()
+    for option in ("-o", "--plot"):
+        result = kfgen("run", SPEC, log, option, path)
+        assert result.exit_code == 2
+        assert "would overwrite" in result.stderr
+    assert kfgen("run", SPEC, log, "-o", "a", "--plot", "./a").exit_code == 2
+    assert kfgen("simulate", SPEC, "-o", SPEC).exit_code == 2
+    assert (Path(log).read_bytes(), Path(SPEC).read_bytes()) == before
+    assert kfgen("run", SPEC, log, "-o", "/dev/null").exit_code == 0
+
+
+def test_a_log_of_another_rate_than_a_fixed_dt(kfgen, log):
+    fixed = Path(SPEC).read_text()
+    start = fixed.index("dt: ")
+    fixed = fixed[:start] + "dt: 0.1" + fixed[fixed.index("\n", start) :]
+    Path("fixed.yaml").write_text(fixed)
+    text = Path(log).read_text().splitlines()
+    slow = [text[0], *(f"{5 * k}," + row.partition(",")[2] for k, row in enumerate(text[1:]))]
+    Path("slow.csv").write_text("\n".join(slow) + "\n")
+    assert kfgen("run", SPEC, "slow.csv").exit_code == 0  # dt is an argument
+    result = kfgen("run", "fixed.yaml", "slow.csv", "-o", "out.csv")
+    assert result.exit_code == 2
+    assert "usual step of t is 5 s, but dt is 0.1 s" in result.stderr
+    assert not Path("out.csv").exists()
+
+
+def test_every_update_failed(kfgen, log):
+    Path("bad.csv").write_text("t,gyro,gnss.x,gnss.y,compass.heading\n1,0,inf,0,\n2,0,,,inf\n")
+    result = kfgen("run", SPEC, "bad.csv", "-o", "out.csv")
+    assert result.exit_code == 1
+    assert result.stderr.splitlines()[-1] == "kfgen: every update failed"
+    assert Path("out.csv").exists()
+    Path("none.csv").write_text("t,gyro,gnss.x,gnss.y,compass.heading\n1,0,,,\n2,0,,,\n")
+    assert kfgen("run", SPEC, "none.csv").exit_code == 0
+
+
 def test_a_plot(kfgen, log):
     pytest.importorskip("matplotlib")
     result = kfgen("run", SPEC, log, "--plot", "out.png")

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import time
 
 import numpy as np
 import pytest
@@ -90,3 +91,43 @@ def test_numbers_are_written_as_short_as_they_read_back(tmp_path):
     ]
     logs.write(tmp_path / "deep" / "out.csv", columns)
     assert (tmp_path / "deep" / "out.csv").read_bytes() == stream.getvalue()
+
+
+RATES = {
+    "steady": (np.arange(200) * 0.1, None),
+    "another origin": (1e6 + np.arange(200) * 0.1, None),
+    "two rows an instant": (np.repeat(np.arange(100) * 0.1, 2), None),
+    "jitter of 4 %": (np.arange(200) * 0.1 + 0.002 * (-1.0) ** np.arange(200), None),
+    "one gap": (np.concatenate([np.arange(100), 130 + np.arange(100)]) * 0.1, None),
+    "no step at all": (np.zeros(5), None),
+    "one row": (np.zeros(1), None),
+    "ten times as fast": (np.arange(200) * 0.01, r"usual step of t is 0.01 s, but dt is 0.1 s; resample"),
+    "6 % off": (np.arange(200) * 0.106, "usual step"),
+    "milliseconds": (np.arange(200) * 100.0, "is t in milliseconds"),
+    "unsorted": (np.array([0, 0.1, 0.3, 0.2, 0.4]), "t falls in row 4, from 0.3; sort"),
+    "gaps": (np.cumsum(np.where(np.arange(200) % 20, 0.1, 0.3)), "9 of 199 steps of t are longer than 1.5 dt"),
+}
+
+
+@pytest.mark.parametrize("name", RATES)
+def test_the_rate_of_a_log(name):
+    t, wrong = RATES[name]
+    log = logs.Log({"t": t}, len(t))
+    if wrong is None:
+        logs.check_rate(log, 0.1)
+        return
+    with pytest.raises(KfgenError, match=wrong):
+        logs.check_rate(log, 0.1)
+
+
+def test_very_many_columns(read):
+    header = ",".join(["t", "gyro", "gnss.x", "gnss.y", "compass.heading", *(f"c{i}" for i in range(100_000))])
+    start = time.perf_counter()
+    log = read(header + "\n" + "0," * 100_004 + "1\n")
+    assert len(log.ignored) == 100_000
+    with pytest.raises(KfgenError) as caught:
+        read(header.replace("gyro", "gyr") + "\n" + "0," * 100_004 + "1\n")
+    assert len(str(caught.value)) < 1000
+    assert "did you mean `gyr`?" in str(caught.value)
+    assert len(logs.listed(log.ignored)) < 400
+    assert time.perf_counter() - start < 5

@@ -35,6 +35,68 @@ def flash(made: Generated) -> int:
     return made.summary.prediction.totals["flash"]
 
 
+SENSORS = """
+kfgen: 1
+name: two
+dt: 0.1
+states: {a: {init: 0, std: 1}, b: {init: 0, std: 1}, c: {init: 0, std: 1}, d: {init: 0, std: 1}, e1: {init: 0, std: 1},
+  g: {init: 0, std: 1}, k: {init: 0, std: 1}, l: {init: 0, std: 1}}
+dynamics: {f: {a: a + dt*b*c, b: b + dt*c*d, c: c + dt*d*e1, d: d + dt*e1*g, e1: e1 + dt*g*k, g: g + dt*k*l},
+  Q: {a: 0.1, b: 0.1, c: 0.1, d: 0.1, e1: 0.1, g: 0.1, k: 0.1, l: 0.1}}
+measurements:
+  often: {z: {x: {h: a + g, std: 1}, y: {h: b*c, std: 1}, z: {h: c, std: 1}}}
+  seldom: {rate: RATE, partial: true, z: {x: {h: k + a, std: 1}, y: {h: b*l, std: 1}}}
+filter: {type: ekf}
+code: CODE
+"""
+
+
+def two(code: str, rate: str = "1/100") -> Generated:
+    return build(loads(SENSORS.replace("RATE", rate).replace("CODE", code)))
+
+
+def test_what_is_called_least_is_rolled_first():
+    """A budget that the largest saving alone would meet still rolls what is called seldom."""
+    full, none = two("{unroll: full}"), two("{unroll: none}")
+    budgets = np.linspace(MARGIN * flash(none), MARGIN * flash(full), 14).astype(int) + 1
+    seen = [two(f"{{flash: {budget}}}").summary.forms for budget in budgets]
+    assert any(forms["update_seldom"] == "loops" and forms["predict"] == "unrolled" for forms in seen)
+    for forms, budget in zip(seen, budgets, strict=True):
+        assert MARGIN * flash(two(f"{{flash: {budget}}}")) <= budget
+        if forms["update_seldom"] == "unrolled":  # then it had to be nothing that is called more often, or it is small
+            assert forms["update_often"] == "unrolled" or forms["predict"] == "loops"
+    often = [two(f"{{flash: {budget}}}", "100").summary.forms for budget in budgets]
+    assert any(forms["update_seldom"] == "unrolled" and forms["predict"] == "loops" for forms in often)
+
+
+def test_functions_by_name():
+    made = two("{unroll: {predict: full, update_seldom: none}}")
+    forms = {"predict": "unrolled", "update_often": "unrolled", "update_seldom": "loops"}
+    assert {name: form for name, form in made.summary.forms.items() if "masked" not in name} == forms
+    assert made.summary.forms.get("update_seldom_masked", "loops") == "loops"
+    straight, loops = two("{unroll: full}"), two("{unroll: none}")
+    assert flash(loops) < flash(made) < flash(straight)
+    tight = two(f"{{unroll: {{predict: full}}, flash: {int(MARGIN * flash(made))}}}")
+    assert tight.summary.forms["predict"] == "unrolled"
+    everything = two("{unroll: {predict: none, update_often: none, update_seldom: none}}")
+    bodies = [f.files["two.c"].split("*/", 1)[1] for f in (everything, loops)]
+    assert bodies[0] == bodies[1]
+
+
+def test_a_function_by_name_with_sigma_points():
+    text = SENSORS.replace("RATE", "1").replace("type: ekf", "type: ukf, covariance: full")
+    text = text.replace("l: {init: 0, std: 1}}", "l: {init: 0, std: 1}, m: {init: 0, std: 1}, n: {init: 0, std: 1}}")
+    text = text.replace("k*l}", "k*l, m: m + dt*n*a}")
+    mixed = build(loads(text.replace("CODE", "{unroll: {predict: full}}"))).files["two.c"]
+    full, auto = (build(loads(text.replace("CODE", f"{{unroll: {how}}}"))).files["two.c"] for how in ("full", "auto"))
+
+    def body(text: str, name: str) -> str:
+        return text.split(f"two_{name}(two_t *kf", 1)[1].split("\n}\n", 1)[0]
+
+    assert body(mixed, "predict") == body(full, "predict") != body(auto, "predict")
+    assert body(mixed, "update_often") == body(auto, "update_often")
+
+
 def test_without_a_budget_nothing_changes():
     straight = build(chain(8, "full")).files
     assert build(chain(8)).files == straight

@@ -133,4 +133,6 @@ def test_a_fixed_step_predicts_in_every_row():
     np.testing.assert_array_equal(work.mask[:, 0], [1, 0, 1])
     own = plan(loads(FIXED), Log({"t": np.array([7.0, 7, 9]), "s.x": np.ones(3)}, 3), 0.1)
     np.testing.assert_array_equal(own.t, [7, 7, 9])
-    np.testing.assert_array_equal(own.step, [1, 1, 1])
+    np.testing.assert_array_equal(own.step, [1, 0, 1])  # one instant, two rows
+    timeless = plan(loads(FIXED.replace("dt: 0.1\n", "")), Log({"t": np.array([7.0, 7, 9]), "s.x": np.ones(3)}, 3))
+    np.testing.assert_array_equal(timeless.step, [1, 1, 1])

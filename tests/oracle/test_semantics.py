@@ -203,6 +203,9 @@ def test_run_with_a_fixed_step_predicts_in_every_row():
     hand.predict()  # the last row's vector is not whole, and the sensor is not `partial`
     np.testing.assert_array_equal(result.x[2], hand.x)
     np.testing.assert_array_equal(result.var[2], hand.P.diagonal())
+    twice = build(CV4).run({"t": [0.1, 0.1, 0.2, 0.3], "gnss.x": [51.0, math.nan, math.nan, 53.0],
+                            "gnss.y": [0.0, math.nan, math.nan, math.nan]})  # fmt: skip
+    np.testing.assert_array_equal(twice.x[3], hand.x)
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -26,6 +26,7 @@ ALLOWED = {
     "interface": set(),
     "scalar_names": set(),
     "files": {"errors"},
+    "seal": set(),
     # the spec, and what reads only it
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
@@ -41,7 +42,7 @@ ALLOWED = {
     "fixed": SPEC | {"emit", "filters", "geometry", "ir", "logs", "model", "scalars"},
     "emit": {"errors", "filters", "ir", "scalars", "status"},
     "budgets": SPEC | {"filters", "ir", "scalars"},
-    "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars"},
+    "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars", "seal"},
     # the compiled filter, and what uses it
     "simulate": SPEC | {"geometry", "logs", "reference"},
     "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
@@ -53,8 +54,8 @@ ALLOWED = {
     | {"status"},
     "layouts": {"emit"},
     "commands": SPEC
-    | {"check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference", "selftest"}
-    | {"simulate", "status"},
+    | {"check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference", "seal"}
+    | {"selftest", "simulate", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
     "__main__": {"cli"},

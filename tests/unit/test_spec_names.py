@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from kfgen.errors import SpecError
 from kfgen.scalar_names import is_scalar
 from kfgen.spec import loads
 from kfgen.spec.names import identifiers, wrong_name
@@ -21,9 +22,9 @@ RESERVED = """
     int restrict class co_await lambda None sin where pi e t dt NULL INFINITY NAN M_PI EOF errno
     true bool I complex INT32_MAX FLT_EPSILON linux PI HALF_PI TWO_PI DEG_TO_RAD F HIGH LOW INPUT
     OUTPUT B0 B1 B01 B11111111 A0 A15 bit word byte boolean round sq constrain radians degrees cli
-    sei interrupts PORTB PB3 SREG TCNT1 isnan and or not
+    sei interrupts PORTB PB3 SREG TCNT1 isnan and or not DEC HEX OCT BIN D0 D7 D10
 """
-FREE = "x px th v_x B2 B010101010 A P Q R D U S h z omega lambda_ y1 gamma beta PX1 i"
+FREE = "dec D D16 D100 x px th v_x B2 B010101010 A P Q R D U S h z omega lambda_ y1 gamma beta PX1 i"
 
 
 @pytest.mark.parametrize("name", RESERVED.split())
@@ -35,6 +36,27 @@ def test_reserved(name: str) -> None:
 @pytest.mark.parametrize("name", FREE.split())
 def test_free(name: str) -> None:
     assert wrong_name(name) is None
+
+
+@pytest.mark.parametrize("name", ["e", "t", "dt", "pi", "sin", "where", "table", "n", "d"])
+def test_sensors_and_components_stand_in_no_expression(name: str) -> None:
+    assert wrong_name(name, in_expressions=False) is None
+    base = BASE.replace("gps:", f"{name}:").replace("east", name)
+    assert loads(base).measurements[0].components[0].name == name
+
+
+@pytest.mark.parametrize("name", ["int", "class", "None", "abs", "HEX", "D3", "isnan", "round", "_x", "1"])
+def test_sensors_and_components_are_emitted(name: str) -> None:
+    assert wrong_name(name, in_expressions=False)
+
+
+def test_an_index_is_no_type() -> None:
+    """TANK_T and tank_t are two names of C, but vehicle_init and VEHICLE_INIT are too easily mistaken."""
+    tank = BASE.replace("{x: {", "{T: {").replace("h: x", "h: T")
+    assert loads(tank.replace("name: car", "name: t")).states[0].name == "T"
+    assert loads(tank.replace("name: car", "name: tank")).states[0].name == "T"
+    with pytest.raises(SpecError, match="equal in upper case"):
+        loads(BASE.replace("{x: {", "{init: {").replace("h: x", "h: init"))
 
 
 @pytest.mark.parametrize("name", ["", "_x", "1x", "a b", "ä", "x" * 41, "a-b", "x\n"])

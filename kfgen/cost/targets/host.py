@@ -118,6 +118,8 @@ def _target() -> Emulated | None:
             command = find_compiler()
         except KfgenError:
             return None
+        if "ziglang" in command or command[0] == "zig":
+            return None  # as the next of the compilers, with a library of its own
         if not sys.platform.startswith("linux") or not has_file(command[0], (), "libc.a"):
             return None  # what is not ELF, or cannot be linked statically, cannot be loaded here
         layout = ("-nostartfiles", "-static", "-no-pie", "-Wl,-Ttext-segment=0x10000,--defsym=_start=0")

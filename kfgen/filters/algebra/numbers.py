@@ -111,10 +111,15 @@ def require_no_column(pivot: Number, entry: Number, row: Number, column: Number)
 def _sign(trace: Trace, node: Node) -> int:
     """2: positive, 1: not negative, 0: not known."""
     facts = _facts(trace)
-    known = facts.get(node)
-    if known is None:
-        known = facts[node] = _derive(trace, node)
-    return known
+    stack = [node]  # no recursion: a step of a thousand substeps is as deep
+    while node not in facts:
+        open_ = [a for a in stack[-1].args if a.kind == "real" and a not in facts]
+        if open_ and stack[-1].constant is None:
+            stack += open_
+            continue
+        facts[stack[-1]] = _derive(trace, stack[-1])
+        stack.pop()
+    return facts[node]
 
 
 def _derive(trace: Trace, node: Node) -> int:

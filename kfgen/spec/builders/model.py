@@ -125,6 +125,7 @@ class ModelBuilder:
             if isinstance(gate, Fields)
             else None,
             f.get("partial", False),
+            f.get("rate"),
             f.get("doc", ""),
             f.place,
         )

@@ -55,6 +55,7 @@ class Builder:
             filter=self.filters.filter(top.get("filter"), states),
             fixed=self.fixed(),
             code=self.code(),
+            advice=tuple(name for name in top.get("advice", ()) if name is not None),
             place=top.place,
             places=dict(top.places),
         )
@@ -128,8 +129,11 @@ class Builder:
         f = self.top.get("code")
         if not isinstance(f, Fields):
             return Code()
+        unroll = f.get("unroll", "auto")
+        own = isinstance(unroll, Fields)
         return Code(
-            f.get("unroll", "auto"),
+            "auto" if own else unroll,
+            {name: how for name, how in entries(unroll) if how is not None} if own else {},
             self.values.number(f.get("flash")),
             self.values.number(f.get("ram")),
             self.values.number(f.get("stack")),

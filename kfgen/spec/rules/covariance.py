@@ -6,8 +6,8 @@ import random
 from fractions import Fraction
 
 from kfgen.errors import Place
-from kfgen.spec.matrices import close, is_semidefinite, smallest_eigenvalue
-from kfgen.spec.operations import Value
+from kfgen.spec.matrices import close, is_semidefinite, smallest_eigenvalue, worst_pair
+from kfgen.spec.operations import Value, apply
 from kfgen.spec.problems import short
 from kfgen.spec.raw import BAD
 from kfgen.spec.rules.facts import Facts, Model, show
@@ -86,7 +86,8 @@ def _initial(facts: Facts, model: Model) -> None:
         return
     rows = [[variances[a] if a == b else entries.get((a, b), Fraction(0)) for b in names] for a in names]
     place = facts.at(f"{model.prefix}covariances", "covariances")
-    _semidefinite(facts, rows, place, "the initial covariance", "make the covariances smaller: |c| <= std1*std2")
+    hint = "make the covariances smaller: |c| <= std1*std2"
+    _semidefinite(facts, rows, names, place, "the initial covariance", hint)
 
 
 def _process(facts: Facts, model: Model) -> None:
@@ -140,7 +141,7 @@ def _matrix(facts: Facts, matrix: Matrix, names: list[str], of: str, path: str, 
     if not _symmetric(facts, matrix, values, context, known):
         return
     if all(number is not None for row in values for number in row):
-        _semidefinite(facts, values, place, f"`{key}`", "a covariance has no negative eigenvalue")
+        _semidefinite(facts, values, names, place, f"`{key}`", "a covariance has no negative eigenvalue")
         return
     for i in range(size):
         variance = values[i][i]
@@ -179,9 +180,18 @@ def _probe(facts: Facts, pair: tuple[Expression, Expression], context: Context, 
     return [facts.tree(entry.tree, point) for entry in pair]
 
 
-def _semidefinite(facts: Facts, rows: list[list[Value]], place: Place, what: str, hint: str) -> None:
+def _semidefinite(
+    facts: Facts, rows: list[list[Value]], names: list[str], place: Place, what: str, hint: str
+) -> None:
     if is_semidefinite(rows):
         return
     smallest = smallest_eigenvalue(rows)
-    shown = f": its smallest eigenvalue is {show(smallest)}" if smallest is not None else ""
-    facts.add(place, f"{what} is not positive semidefinite{shown}", hint)
+    text = f"{what} is not positive semidefinite"
+    text += f": its smallest eigenvalue is {show(smallest)}" if smallest is not None else ""
+    pair = worst_pair(rows)
+    if pair is not None:
+        i, j = pair
+        limit = apply("sqrt", [apply("mul", [rows[i][i], rows[j][j]])])
+        text += f"; the covariance of {short(names[i])} and {short(names[j])} is {show(rows[i][j])}"
+        hint = f"it may be at most {show(limit)} in size, the root of their variances' product"
+    facts.add(place, text, hint)
