@@ -113,6 +113,7 @@ class Trace:
         self.raised: list[tuple[Value, str]] = []  # conditions of warnings, and which
         self.depth = 0  # of loops and branches
         self.names: dict[Node, str] = {}
+        self.arguments_at: int | None = None  # where in the body what the function is given is tested
         self.doubts: list[tuple[Value, str]] = []  # conditions under which an assumption made fails, and why
         self.declared: Counter[str] = Counter()
         self.signs: dict[Node, int] = {}  # what is known of the sign of values (see filters.numbers)

@@ -17,6 +17,7 @@ from kfgen.reference.log import Run, replay
 from kfgen.reference.mode import ModeView
 from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.parameters import Parameters
+from kfgen.reference.reading import read_by_predict, read_by_update
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.types import Filter, Spec
@@ -45,6 +46,8 @@ class ReferenceFilter:
         self.sensors = algorithm.sensors
         self._step = step_of(spec, self.model.number)
         self._fixed = fixed_step(spec)
+        self._read_by_predict = read_by_predict(spec)
+        self._read_by_update = {sensor: read_by_update(spec, sensor) for sensor in self.sensors}
         self.init()
 
     @property
@@ -176,7 +179,8 @@ class ReferenceFilter:
             raise TypeError("predict: this filter takes dt")
         try:
             step, flags = self._step.nominal, Status.OK
-            if not np.isfinite(inputs).all() or (dt is not None and not math.isfinite(dt)):
+            self._test(self._read_by_predict, inputs)
+            if dt is not None and not math.isfinite(dt):
                 raise StepError(Status.NOT_FINITE)
             if self._step.run_time and dt is not None:
                 step, flags = self._step.clamped(float(dt))
@@ -202,7 +206,8 @@ class ReferenceFilter:
             return int(Status.OK)
         reading = Reading(model, measured, used, Context(self.parameters, inputs, self._clock.now, 0.0))
         try:
-            if not np.isfinite(measured[list(used)]).all() or not np.isfinite(inputs).all():
+            self._test(self._read_by_update[sensor], inputs)
+            if not np.isfinite(measured[list(used)]).all():
                 raise StepError(Status.NOT_FINITE)
             if self._initialises(reading):
                 return int(self._initialise(reading))
@@ -223,6 +228,12 @@ class ReferenceFilter:
                 raise TypeError(f"this filter takes u: {', '.join(self.model.inputs)}")
             return np.zeros(len(self.model.inputs))
         return np.array(u, dtype=np.float64).reshape(len(self.model.inputs))
+
+    def _test(self, read: frozenset[str], inputs: Vector) -> None:
+        """Raises NOT_FINITE for an input or a parameter that is read and is not finite."""
+        given = {**dict(zip(self.model.inputs, map(float, inputs), strict=True)), **self.parameters}
+        if not all(math.isfinite(value) for name, value in given.items() if name in read):
+            raise StepError(Status.NOT_FINITE)
 
     def _judge(self, reading: Reading) -> Status:
         """An update behind the gate: the whole vector, or nothing of it."""

@@ -134,6 +134,8 @@ def sequential(P: Matrix, H: Matrix, R: Matrix, y: Vector, rules: Rules = PLAIN)
             P, c = inflation * P, inflation * c
             s = r + g * c
             flags |= Status.ANOMALY
+        if not math.isfinite(s):
+            raise StepError(Status.NOT_FINITE)
         if s < rules.floor:
             r, s = r + rules.floor - s, rules.floor
             flags |= Status.REGULARIZED

@@ -11,6 +11,7 @@ from kfgen.reference.dual import Matrix, Number, Vector, jacobian, value_of, val
 from kfgen.reference.evaluate import Closure, renamed
 from kfgen.reference.linalg import symmetric
 from kfgen.reference.model import PREDICTED, Context, Model, Z, wrap
+from kfgen.reference.reading import in_use
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Sensor
@@ -66,7 +67,8 @@ class SensorModel:
         self._R = model.covariance(own if sensor.R is None else sensor.R, self.components)
         self.bent = tuple(c.residual is not None or c.period is not None for c in sensor.components)
         self._noises = [noise.name for noise in sensor.noise]
-        self._Re = model.noise_covariance(sensor.noise, sensor.noise_covariance)
+        predicted = [component.h for component in sensor.components]
+        self._Re = model.noise_covariance(in_use(model.spec, sensor.noise, predicted), sensor.noise_covariance)
         self.takes_inputs = bool(_reach(model, sensor) & set(model.inputs))
 
     def predict(self, x: Sequence[Number], e: Sequence[Number], context: Context, used: Sequence[int]) -> list[Number]:

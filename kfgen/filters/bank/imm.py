@@ -154,6 +154,7 @@ class Imm:
         x = self.combined(t, made, mu)
         self._store(t, runs, x, mu)
         process.store_time(t, self.model, step)
+        guards.settled(t, self.model)
         names = taken | {a.name for a in arguments}
         return Function("predict", arguments, schedule(t, names), predict_doc(self.model))
 
@@ -239,6 +240,7 @@ class Imm:
         x = self.combined(t, made, mu)
         self._store(t, runs, x, mu)
         store_outcome(t, self.model, sensors, smallest(t, judged), log_likelihood)
+        guards.settled(t, self.model)
         name, doc = update_name(sensors[0], partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
 

@@ -89,8 +89,9 @@ class Ekf(SingleFilter):
         moved = {i for i, (value, before) in enumerate(zip(x, prior.x, strict=True)) if value.node is not before.node}
         t.section("guards")
         values = [v for rows in (F, result.Q) for row in rows for v in row]
-        guards.doubts(t, [*result.x, *values, *(d for _, d in noise)])
-        guards.finite(t, [x[i] for i in sorted(moved)] + evidence)
+        values += [v for w, d in noise for v in (*w, d)]
+        guards.doubts(t, [*result.x, *values])
+        guards.finite(t, [x[i] for i in sorted(moved)] + evidence, values)
         yield Made(x, P)
         self.store(t, x, moved if t.in_place else set(range(len(x))), P, after_predict=True)
 
@@ -126,14 +127,14 @@ class Ekf(SingleFilter):
             guards.doubts(t, [*self._model_values(innovation), *u.tested])
             # nis shows whether z is finite, but for components that may have been skipped
             skippable = [v for v, r in zip(innovation.y, innovation.variances, strict=True) if not is_positive(r)]
-            guards.finite(t, [*skippable, *x, result.nis, *evidence, *u.tested])
+            guards.finite(t, [*skippable, *x, result.nis, *evidence, *u.tested], self._entering(innovation, result))
             guards.positive(t, result.failures)
         elif final is result:
             yield from self.judged(u, innovation, result)
             guards.finite(t, [result.nis, *x, *evidence])
         else:
             guards.doubts(t, x)
-            guards.finite(t, [result.nis, *x, *final.s, *evidence])
+            guards.finite(t, [result.nis, *x, *final.s, *evidence], [final.log_likelihood])
             guards.positive(t, final.failures)
         kept = self.prepared(u, x, P, final.motion)
         yield Made(x, P, result.nis, final.log_likelihood)
@@ -191,7 +192,7 @@ class Ekf(SingleFilter):
         t = u.t
         t.section("guards")
         guards.doubts(t, [*self._model_values(innovation), *u.tested])
-        guards.finite(t, [*innovation.y, *plain.s, *u.tested])
+        guards.finite(t, [*innovation.y, *u.tested], self._entering(innovation, plain))
         guards.positive(t, plain.failures)
         yield Judged(plain.nis)
 
@@ -222,6 +223,10 @@ class Ekf(SingleFilter):
     def residual_after(self, u: Update, x: list[Value], P: Any) -> Vector:
         """z - h at the new x."""
         return u.code.residual(x)
+
+    def _entering(self, innovation: Innovation, result: Updated[Any]) -> list[Value]:
+        """What enters the estimate: innovation variances, and through them R and H."""
+        return [*result.s, *self._model_values(innovation)]
 
     def _model_values(self, innovation: Innovation) -> list[Value]:
         values = [v for row in innovation.rows for v in row if isinstance(v, Value)]

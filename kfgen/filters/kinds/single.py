@@ -7,6 +7,7 @@ from typing import Any
 
 from kfgen.filters.base import Block, FilterCode
 from kfgen.filters.covariance.base import Form
+from kfgen.filters.frame import guards
 from kfgen.filters.frame.runs import put
 from kfgen.filters.steps import process
 from kfgen.filters.steps.adapt import AdaptedQ, AdaptedR
@@ -154,6 +155,7 @@ class SingleFilter(ABC):
         for _ in self.predicting(t, step):
             pass
         process.store_time(t, self.model, step)
+        guards.settled(t, self.model)
         names = taken | {a.name for a in arguments}
         return Function("predict", arguments, schedule(t, names), predict_doc(self.model))
 
@@ -170,6 +172,7 @@ class SingleFilter(ABC):
         assert made.nis is not None
         assert made.log_likelihood is not None
         store_outcome(t, model, [sensor], made.nis, made.log_likelihood)
+        guards.settled(t, model)
         name, doc = update_name(sensor, partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
 

@@ -47,8 +47,7 @@ def begin_predict(t: Trace, model: Model) -> tuple[list[Argument], Step]:
     arguments: list[Argument] = [KF]
     if model.inputs:
         arguments.append(INPUTS)
-        t.section("arguments")
-        guards.inputs(t, model.inputs)
+    guards.arguments(t)
     if model.dt is None and model.spec.dt is not None:
         arguments.append(DT)
     return arguments, process.step_length(t, model)
@@ -76,7 +75,7 @@ def begin_update(
         t.guard(~some, "OK")
     if any(needs_inputs(model, sensor) for model, sensor in zip(models, sensors, strict=True)):
         arguments.append(INPUTS)
-        guards.inputs(t, models[0].inputs)
+    guards.arguments(t)
     if partial:
         arguments.append(MASK)
     return arguments, used
