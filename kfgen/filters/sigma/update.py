@@ -14,6 +14,7 @@ from typing import Any
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.linalg import Rows, Vector, times
 from kfgen.filters.algebra.numbers import (
+    Number,
     assume_nonnegative,
     assume_positive,
     is_positive,
@@ -160,6 +161,7 @@ class _Whole:
         self.ukf = ukf
         self.u = u
         self.seeing = seeing
+        self.H = linear.H
         m = seeing.m
         R: Rows = linear.R
         if u.adapted is not None:
@@ -207,8 +209,18 @@ class _Whole:
         epsilon = self.ukf.scalar.epsilon
         # points differ from each other by the rounding of what h is made of, if by nothing else
         total = sum(abs(w) for w in self.seeing.points.wc) * (32 * epsilon) ** 2
-        noise: Vector = [0 if self.sure or self.seeing.linear else z * z * total for z in seen.z]
+        noise: Vector = [0 if self.sure else z * z * total for z in seen.z]
+        if self.seeing.linear and not self.sure:
+            noise = [self._left(h) for h in self.H]
         return factored(t, names, self.y(seen), S, cross, self.sure, 8 * epsilon, noise)
+
+    def _left(self, h: Vector) -> Number:
+        """What rounding may leave of h P h^T where h x is known exactly."""
+        places = [i for i, a in enumerate(h) if not is_zero(a)]
+        if len(places) < 2:
+            return 0
+        P, n = self.ukf.form.entries(self.u.P), self.seeing.n
+        return sum(P[i, i] * (h[i] * h[i]) for i in places) * (8 * n * self.ukf.scalar.epsilon)
 
     def inflated(
         self, seen: Seen, first: Factored, array: Array | None, out: Array | None
