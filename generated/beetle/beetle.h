@@ -18,7 +18,7 @@
  * RAM 152 bytes a filter. Operations:
  *   predict        586 mul, 464 add, 70 div, 4 sqrt, 27 compare, 10 cos, 1 exp, 47 select, 10 sin,
  *       18 wrap
- *   update_camera  142 mul, 121 add, 17 div, 8 compare, 2 exp, 4 log, 2 max, 1 min, 4 select, 5
+ *   update_camera  142 mul, 125 add, 17 div, 8 compare, 2 exp, 4 log, 2 max, 1 min, 4 select, 5
  *       wrap
  * Recommended with gcc, for these long functions without branches:
  *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
@@ -135,7 +135,7 @@ beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt);
  * @param z   x [cm], y [cm]
  * @return BEETLE_OK, or an error that leaves *kf as it was
  *
- * 142 mul, 121 add, 17 div, 8 compare, 2 exp, 4 log, 2 max, 1 min, 4 select, 5 wrap.
+ * 142 mul, 125 add, 17 div, 8 compare, 2 exp, 4 log, 2 max, 1 min, 4 select, 5 wrap.
  */
 beetle_status_t beetle_update_camera(beetle_t *kf, const beetle_camera_t *z);
 

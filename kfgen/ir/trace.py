@@ -114,6 +114,7 @@ class Trace:
         self.depth = 0  # of loops and branches
         self.names: dict[Node, str] = {}
         self.arguments_at: int | None = None  # where in the body what the function is given is tested
+        self.needed: dict[str, Value] = {}  # path of something given -> whether it counts, where it does not always
         self.doubts: list[tuple[Value, str]] = []  # conditions under which an assumption made fails, and why
         self.declared: Counter[str] = Counter()
         self.signs: dict[Node, int] = {}  # what is known of the sign of values (see filters.numbers)

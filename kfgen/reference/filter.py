@@ -17,7 +17,7 @@ from kfgen.reference.log import Run, replay
 from kfgen.reference.mode import ModeView
 from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.parameters import Parameters
-from kfgen.reference.reading import read_by_predict, read_by_update
+from kfgen.reference.reading import Read
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.types import Filter, Spec
@@ -46,8 +46,7 @@ class ReferenceFilter:
         self.sensors = algorithm.sensors
         self._step = step_of(spec, self.model.number)
         self._fixed = fixed_step(spec)
-        self._read_by_predict = read_by_predict(spec)
-        self._read_by_update = {sensor: read_by_update(spec, sensor) for sensor in self.sensors}
+        self._read = Read(spec)
         self.init()
 
     @property
@@ -179,7 +178,7 @@ class ReferenceFilter:
             raise TypeError("predict: this filter takes dt")
         try:
             step, flags = self._step.nominal, Status.OK
-            self._test(self._read_by_predict, inputs)
+            self._test(self._read.predict, inputs)
             if dt is not None and not math.isfinite(dt):
                 raise StepError(Status.NOT_FINITE)
             if self._step.run_time and dt is not None:
@@ -206,7 +205,7 @@ class ReferenceFilter:
             return int(Status.OK)
         reading = Reading(model, measured, used, Context(self.parameters, inputs, self._clock.now, 0.0))
         try:
-            self._test(self._read_by_update[sensor], inputs)
+            self._test(self._read.update(sensor, used), inputs)
             if not np.isfinite(measured[list(used)]).all():
                 raise StepError(Status.NOT_FINITE)
             if self._initialises(reading):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from kfgen.reference.evaluate import renamed
@@ -11,6 +11,22 @@ from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Matrix, Noise, Sensor, Spec
 
 Names = frozenset[str]
+
+
+class Read:
+    """What the functions of a filter read. Attribute: predict."""
+
+    def __init__(self, spec: Spec) -> None:
+        self.spec = spec
+        self.predict = read_by_predict(spec)
+        self._update: dict[tuple[str, tuple[int, ...]], Names] = {}
+
+    def update(self, sensor: str, used: tuple[int, ...]) -> Names:
+        """Of an update with some of a sensor's components."""
+        key = sensor, used
+        if key not in self._update:
+            self._update[key] = read_by_update(self.spec, sensor, used)
+        return self._update[key]
 
 
 def read_by_predict(spec: Spec) -> Names:
@@ -31,11 +47,13 @@ def read_by_predict(spec: Spec) -> Names:
     return _closure(spec, formulas)
 
 
-def read_by_update(spec: Spec, sensor: str) -> Names:
-    """Names in h, R, the sensor's noise inputs in use, its own residuals and gate, and psi; of an imm of any mode."""
+def read_by_update(spec: Spec, sensor: str, used: Sequence[int] | None = None) -> Names:
+    """Names in h, R and own residuals of the components in use (None: all), in the noise inputs that these h contain,
+    and in psi; of an imm of any mode."""
     if spec.imm is not None:
-        return Names().union(*(read_by_update(mode, sensor) for mode in mode_specs(spec)))
-    (own,) = [each for each in spec.measurements if each.name == sensor]
+        return Names().union(*(read_by_update(mode, sensor, used) for mode in mode_specs(spec)))
+    (whole,) = [each for each in spec.measurements if each.name == sensor]
+    own = whole if used is None else _part(whole, used)
     formulas = [component.h for component in own.components]
     if spec.filter.gain is None:
         formulas += _noise(in_use(spec, own.noise, formulas), own.noise_covariance)
@@ -46,6 +64,12 @@ def read_by_update(spec: Spec, sensor: str) -> Names:
     psi = [] if robust is None else [e.tree for e in (robust.psi, robust.psi_dot) if e is not None]
     trees = [*(formula.tree for formula in formulas), *residuals, *psi]
     return _reach(spec, [name for tree in trees for name in names(tree)])
+
+
+def _part(sensor: Sensor, used: Sequence[int]) -> Sensor:
+    """The sensor as if it had only some of its components."""
+    R = None if sensor.R is None else tuple(tuple(sensor.R[i][j] for j in used) for i in used)
+    return replace(sensor, components=tuple(sensor.components[i] for i in used), R=R)
 
 
 _HIDDEN = {"z": "", "h": ""}

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import reduce
 from operator import or_
 
 from kfgen.filters.frame.runs import summed
-from kfgen.filters.frame.shown import shown, shown_first
-from kfgen.ir.nodes import Node
-from kfgen.ir.program import Call, Guard, Statement, roots, walk
+from kfgen.filters.frame.shown import is_sure, shown, shown_first, unwrapped
+from kfgen.ir.given import given
+from kfgen.ir.nodes import BOOL, Node
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 
-GIVEN = ("u.", "kf.parameters.")
-"""Paths of the numbers that a caller sets, and that a function may read or leave."""
 
-
-def arguments(t: Trace) -> None:
-    """Here the inputs and parameters that the function reads are tested; `settled` knows which."""
+def arguments(t: Trace, needed: Mapping[str, Value] | None = None) -> None:
+    """Here the inputs and parameters that the function reads are tested; `settled` knows which. needed: whether one
+    counts, where it does not always, by its path."""
     t.arguments_at = len(t.block.items)
+    t.needed = dict(needed or {})
 
 
 def settled(t: Trace, model: Model) -> None:
@@ -27,7 +26,7 @@ def settled(t: Trace, model: Model) -> None:
     sum of large numbers would overflow. A parameter needs no test where a later one shows it, and no other status can
     come before."""
     assert t.arguments_at is not None, "a function that reads what it is given"
-    read = _read(t)
+    read = given(item for block in (t.block, *t.blocks.values()) for item in block.items if not isinstance(item, Node))
     seen = {node.data for node in shown_first(t) if node.op == "field"}
     paths = [f"u.{name}" for name in model.inputs if f"u.{name}" in read]
     paths += [path for path in (f"kf.parameters.{name}" for name, _ in model.parameters) if path in read - seen]
@@ -36,7 +35,10 @@ def settled(t: Trace, model: Model) -> None:
     if paths:
         t.section("arguments")
     for path in paths:
-        t.guard(~t.finite(t.field(path)), "NOT_FINITE")
+        test = t.pool.fresh("finite", (t.field(path).node,), None, BOOL)  # a later test may be the same
+        test.volatile = False
+        failed = ~t.wrapped(test)
+        t.guard(t.needed[path] & failed if path in t.needed else failed, "NOT_FINITE")
     recorded[t.arguments_at : t.arguments_at] = t.block.items
     t.block.items = recorded
 
@@ -46,12 +48,13 @@ def finite(t: Trace, values: Iterable[Value], entering: Iterable[Value] = ()) ->
 
     entering: what has entered the estimate too, tested where the values do not show it: 1 / s is finite where s is not.
     """
-    live = list({v.node: v for v in map(t.value, values) if v.constant is None}.values())
-    seen = shown(v.node for v in live)
-    for v in entering:
-        if v.constant is None and v.node not in seen:
-            live.append(v)
-            seen |= shown([v.node])
+    nodes = list(dict.fromkeys(unwrapped(t.node(v)) for v in values))
+    seen = shown(nodes)
+    for node in (unwrapped(v.node) for v in entering):
+        if not is_sure(node, seen):
+            nodes.append(node)
+            seen |= shown([node])
+    live = [t.wrapped(node) for node in nodes if node.constant is None]
     live = summed(t, live)
     if live:
         t.guard(~t.finite(sum(live[1:], live[0])), "NOT_FINITE")
@@ -71,26 +74,3 @@ def doubts(t: Trace, values: list[Value]) -> None:
         for condition, why in t.doubts:
             t.guard(condition, "NOT_POSITIVE", why)
         t.doubts.clear()
-
-
-def _read(t: Trace) -> set[str]:
-    """Paths of the inputs and parameters that statements use, private functions included."""
-    found: set[str] = set()
-    seen: set[int] = set()
-
-    def visit(statements: Iterable[Statement]) -> None:
-        for statement in statements:
-            if isinstance(statement, Call):
-                visit(walk(statement.callee.body))
-            stack: list[Node] = roots(statement)
-            while stack:
-                node = stack.pop()
-                if id(node) not in seen:
-                    seen.add(id(node))
-                    if node.op == "field" and str(node.data).startswith(GIVEN):
-                        found.add(node.data)
-                    stack += node.args
-
-    for block in (t.block, *t.blocks.values()):
-        visit(item for item in block.items if not isinstance(item, Node))
-    return found

@@ -31,7 +31,7 @@ from kfgen.filters.kinds.ekf import Ekf, Update
 from kfgen.filters.sigma.seeing import Seeing, Seen
 from kfgen.filters.steps.gate import chi2_threshold
 from kfgen.filters.steps.phases import Judged, Made, Phases
-from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated
+from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated, masked
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model.model import SensorModel
 from kfgen.quantiles import log_two_pi
@@ -112,7 +112,7 @@ def whole_vector(
     t.section("guards")
     sound = [*work.y(seen), *first.D, *u.tested, *(v for row in work.R for v in row)]
     guards.finite(t, [*sound, nis] if sensor.gate is None else sound)
-    guards.doubts(t, [v for row in linear.R for v in row])
+    guards.doubts(t, [v for row in work.R for v in row])
     guards.positive(t, [*failures, *first.failures])
     yield Judged(nis)
     P = u.P
@@ -139,11 +139,11 @@ def whole_vector(
         likelihood = likelihood + (term if counts is None else t.select(counts, term, 0))
     t.section("state")
     x = ukf.moved(u, motion)
-    evidence = ukf.unconfined(x) + form.evidence(P, after_predict=False)
+    evidence = ukf.unconfined(x) + form.evidence(P, after_predict=final is not first)
     P = ukf.limited(t, P)
     x = ukf.state.confined(t, x)
     t.section("guards")
-    guards.finite(t, [nis, *x, *evidence])
+    guards.finite(t, [nis, *x, *evidence], [] if final is first else [*final.D, likelihood])
     if not work.definite:
         P, indefinite = form.indefinite(P, seeing.n * ukf.scalar.epsilon)
         failed += indefinite
@@ -167,7 +167,8 @@ class _Whole:
         if u.adapted is not None:
             adapted = u.adapted.adapted(u.t, seen.spread, u.used)
             R = [[adapted[i, j] for j in range(m)] for i in range(m)]
-        self.R: Rows = [[R[i][j] + linear.added[i][j] for j in range(m)] for i in range(m)]
+        R = [[R[i][j] + linear.added[i][j] for j in range(m)] for i in range(m)]
+        self.R: Rows = R if u.used is None else masked(u.t, linear, R, u.used)[1]
         if u.adapted is None and any(r.constant is None for row in self.R for r in row):
             for d in decorrelated(u.t, linear, self.R).variances:
                 require_nonnegative(d, "R is not positive semidefinite")
@@ -194,7 +195,6 @@ class _Whole:
         t, used, m = self.u.t, self.u.used, self.seeing.m
         spread, R, cross = self.spread(seen), self.R, seen.cross
         if used is not None:
-            R = [[select(used[i] & used[j], R[i][j], t.one if i == j else t.zero) for j in range(m)] for i in range(m)]
             cross = [[c if is_zero(c) else select(b, c, t.zero) for b, c in zip(used, row, strict=True)]
                      for row in cross]  # fmt: skip
         S = [[spread[i][j] + R[i][j] for j in range(m)] for i in range(m)]

@@ -13,6 +13,7 @@ from typing import Any
 from kfgen.filters.base import DT, INPUTS, KF, MASK, sensor_argument
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
+from kfgen.filters.steps.needed import needed
 from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.sensor import needs_inputs
 from kfgen.ir.program import Argument
@@ -75,7 +76,7 @@ def begin_update(
         t.guard(~some, "OK")
     if any(needs_inputs(model, sensor) for model, sensor in zip(models, sensors, strict=True)):
         arguments.append(INPUTS)
-    guards.arguments(t)
+    guards.arguments(t, needed(models, sensors, used))
     if partial:
         arguments.append(MASK)
     return arguments, used
