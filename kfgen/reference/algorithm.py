@@ -79,6 +79,10 @@ class Estimator(ABC):
     def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
         """The innovation of a reading, by the plain residual and covariance: what the gate judges."""
 
+    def nis_of_modes(self, innovation: Innovation) -> tuple[float, ...]:
+        """The nis of each filter of a bank."""
+        return (innovation.nis,)
+
     @abstractmethod
     def judge(self, innovation: Innovation, reading: Reading, rejected: int) -> Status:
         """What the gate says of a reading, `rejected` of whose sensor were in a row: see Gates.judge."""

@@ -76,6 +76,9 @@ class Bank(Estimator):
         )
         return Innovation(min(innovation.nis for innovation in found), tuple(found))
 
+    def nis_of_modes(self, innovation: Innovation) -> tuple[float, ...]:
+        return tuple(part.nis for part in _innovations(innovation))
+
     def judge(self, innovation: Innovation, reading: Reading, rejected: int) -> Status:
         """The most willing mode decides for all of them.
 

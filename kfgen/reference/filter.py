@@ -115,6 +115,7 @@ class ReferenceFilter:
         # without a dt the spec has no seconds: t then counts steps
         self._clock = Clock(Fraction(1) if self.spec.dt is None else self._fixed)
         self.nis = 0.0
+        self.nis_of_modes = (0.0,) * len(self.algorithm.options)
         self.log_likelihood = 0.0
         self.gate_count = dict.fromkeys(self.sensors, 0)
         self._uninitialised = self.spec.initialize is not None
@@ -238,14 +239,16 @@ class ReferenceFilter:
         """An update behind the gate: the whole vector, or nothing of it."""
         name = reading.sensor.name
         innovation = self.algorithm.innovate(self._estimate, reading)
+        every = self.algorithm.nis_of_modes(innovation)
         verdict = self.algorithm.judge(innovation, reading, self.gate_count[name])
         if verdict == Status.GATED:
-            self.nis = innovation.nis
+            self.nis, self.nis_of_modes = innovation.nis, every
             self.gate_count[name] += 1
             return verdict
         correction: Correction = self.algorithm.correct(self._estimate, reading, innovation)
         self._estimate = correction.estimate
         self.nis, self.log_likelihood = innovation.nis, correction.log_likelihood
+        self.nis_of_modes = every
         self.gate_count[name] = 0
         return verdict | correction.flags
 

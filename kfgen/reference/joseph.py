@@ -141,6 +141,8 @@ def sequential(P: Matrix, H: Matrix, R: Matrix, y: Vector, rules: Rules = PLAIN)
             flags |= Status.REGULARIZED
         K = P @ h / s
         K[list(rules.consider)] = 0.0
+        if np.any(np.abs(K) > rules.limit):
+            flags |= Status.REGULARIZED
         K = np.clip(K, -rules.limit, rules.limit)
         P = _joseph(P, K, h, r, g)
         steps.append(K * nu)

@@ -24,10 +24,10 @@ from kfgen.filters.frame import guards
 from kfgen.filters.frame.shared import shared
 from kfgen.filters.kinds.single import LONG_FUNCTIONS, SingleFilter
 from kfgen.filters.steps import process
-from kfgen.filters.steps.gate import gate, smallest, store_outcome
+from kfgen.filters.steps.gate import gate, store_outcome
 from kfgen.filters.steps.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.steps.process import Step
-from kfgen.filters.steps.state import StateCode
+from kfgen.filters.steps.state import NIS, StateCode
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
@@ -46,7 +46,7 @@ class Imm:
         # what is to stay above 0 must not become 0 by the rounding of mu
         self.floor = max(bank.mu_floor, scalar.probability) if bank.mu_floor > 0 else bank.mu_floor
         self.lively = bank.lively(scalar.smallest, scalar.probability)
-        self.modes = [Mode(name, f, f.own_blocks()) for name, f in zip(bank.names, filters, strict=True)]
+        self.modes = [Mode(name, f, (*f.own_blocks(), NIS)) for name, f in zip(bank.names, filters, strict=True)]
         forms = [f.form for f in filters]
         self.mixers = [form.mixer(forms) for form in forms]
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
@@ -229,7 +229,8 @@ class Imm:
             first.append(_advance(t, *runs[-1]))
         t.settle()
         judged = [phase.nis for phase in first if phase.nis is not None]
-        gate(t, self.model, sensors, judged, used)
+        fields = [mode.path("nis") for mode in self.modes]
+        gate(t, self.model, sensors, judged, used, fields)
         made: list[Made] = []
         for run, phase in zip(runs, first, strict=True):
             while isinstance(phase, Judged):
@@ -239,7 +240,7 @@ class Imm:
         mu, log_likelihood = self.weighed(t, made)
         x = self.combined(t, made, mu)
         self._store(t, runs, x, mu)
-        store_outcome(t, self.model, sensors, smallest(t, judged), log_likelihood)
+        store_outcome(t, self.model, sensors, judged, log_likelihood, fields)
         guards.settled(t, self.model)
         name, doc = update_name(sensors[0], partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)

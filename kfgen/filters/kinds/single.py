@@ -171,7 +171,7 @@ class SingleFilter(ABC):
                 made = phase
         assert made.nis is not None
         assert made.log_likelihood is not None
-        store_outcome(t, model, [sensor], made.nis, made.log_likelihood)
+        store_outcome(t, model, [sensor], [made.nis], made.log_likelihood)
         guards.settled(t, model)
         name, doc = update_name(sensor, partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)

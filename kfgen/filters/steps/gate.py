@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import reduce
 from operator import and_
@@ -15,10 +16,14 @@ from kfgen.model.model import SensorModel
 from kfgen.quantiles import chi2_quantile
 
 
-def gate(t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], used: list[Value] | None) -> None:
+def gate(
+    t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], used: list[Value] | None,
+    fields: Sequence[str] = (),
+) -> None:
     """End the update where nis is beyond the gate; after reset_after rejections take it all the same.
 
-    A bank has the sensor and nis of each of its modes, and refuses what all of them refuse. used: whether each
+    A bank has the sensor and nis of each of its modes, and refuses what all of them refuse; fields: where each nis is
+    kept. used: whether each
     component counts, where a mask tells.
     """
     gates = [sensor.gate for sensor in sensors if sensor.gate is not None]
@@ -28,6 +33,7 @@ def gate(t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], u
     m = sensors[0].dimension
     beyond = reduce(and_, [v > chi2_threshold(t, p, m, used) for p, v in zip(gates, nis, strict=True)])
     before = [Store("kf.nis", None, smallest(t, nis).node)]
+    before += [Store(path, None, v.node) for path, v in zip(fields, nis, strict=bool(fields))]
     if not counts_gated(model, sensors):
         t.guard(beyond, "GATED", before=before)
         return
@@ -47,12 +53,15 @@ def smallest(t: Trace, values: list[Value]) -> Value:
 
 
 def store_outcome(
-    t: Trace, model: Model, sensors: list[SensorModel], nis: Value, log_likelihood: Value
+    t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], log_likelihood: Value,
+    fields: Sequence[str] = (),
 ) -> None:
-    """What an accepted update leaves beside the estimate."""
+    """What an accepted update leaves beside the estimate. fields: where a bank keeps the nis of each of its modes."""
     if counts_gated(model, sensors):
         t.store(f"kf.gate_count_{sensors[0].name}", None, t.wrapped(t.pool.integer(0)))
-    t.store("kf.nis", None, nis)
+    for path, value in zip(fields, nis, strict=bool(fields)):
+        t.store(path, None, value)
+    t.store("kf.nis", None, smallest(t, nis))
     if model.spec.code.log_likelihood:
         t.store("kf.log_likelihood", None, log_likelihood)
 
