@@ -14,7 +14,7 @@ from kfgen.errors import KfgenError, Mistake, Place, SpecError
 from kfgen.geometry import Part, part_of
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
-from kfgen.model.options import INNOVATION, Options, build_options
+from kfgen.model.options import INNOVATION, GateModel, Options, build_gate, build_options
 from kfgen.model.symbolic import to_sympy
 from kfgen.spec.tree import Expression
 from kfgen.spec.types import Matrix, Noise, Sensor, Spec
@@ -42,7 +42,7 @@ class SensorModel:
     periods: tuple[Fraction | None, ...]
     noises: tuple[NoiseModel, ...]
     noise_covariance: tuple[tuple[Symbolic, ...], ...]
-    gate: Fraction | None  # probability
+    gate: GateModel | None
 
     @property
     def name(self) -> str:
@@ -122,6 +122,7 @@ class Model:
     def sensor_expressions(self, sensor: SensorModel) -> list[Symbolic]:
         """All expressions that an update of the sensor evaluates."""
         out = [*sensor.h, *(r for r in sensor.residual if r is not None)]
+        out += [] if sensor.gate is None or sensor.gate.threshold is None else [sensor.gate.threshold]
         for matrix in (sensor.R, sensor.noise_covariance):
             out += [entry for row in matrix for entry in row]
         return out
@@ -278,7 +279,7 @@ class _Builder:
             periods=tuple(None if c.period is None else self.number(c.period) for c in sensor.components),
             noises=self.noises(sensor.noise),
             noise_covariance=self.covariance(sensor.noise, sensor.noise_covariance),
-            gate=None if sensor.gate is None else self.number(sensor.gate.probability),
+            gate=build_gate(sensor.gate, self.number, self.tree),
         )
 
     def initial_covariance(self, names: Mapping[str, Symbolic]) -> tuple[tuple[Fraction, ...], ...]:

@@ -49,7 +49,7 @@ def read_by_predict(spec: Spec) -> Names:
 
 def read_by_update(spec: Spec, sensor: str, used: Sequence[int] | None = None) -> Names:
     """Names in h, R and own residuals of the components in use (None: all), in the noise inputs that these h contain,
-    and in psi; of an imm of any mode."""
+    in the gate and in psi; of an imm of any mode."""
     if spec.imm is not None:
         return Names().union(*(read_by_update(mode, sensor, used) for mode in mode_specs(spec)))
     (whole,) = [each for each in spec.measurements if each.name == sensor]
@@ -62,6 +62,8 @@ def read_by_update(spec: Spec, sensor: str, used: Sequence[int] | None = None) -
     residuals = [renamed(c.residual.tree, _HIDDEN) for c in own.components if c.residual is not None]
     robust = spec.filter.robust
     psi = [] if robust is None else [e.tree for e in (robust.psi, robust.psi_dot) if e is not None]
+    if own.gate is not None and own.gate.threshold is not None:
+        formulas.append(own.gate.threshold)
     trees = [*(formula.tree for formula in formulas), *residuals, *psi]
     return _reach(spec, [name for tree in trees for name in names(tree)])
 

@@ -157,6 +157,7 @@ def _reach(model: Model, sensor: Sensor) -> set[str]:
     formulas: list[Expression | None] = []
     for component in sensor.components:
         formulas += [component.h, component.variance]
+    formulas += [] if sensor.gate is None else [sensor.gate.threshold]
     formulas += [noise.variance for noise in sensor.noise]
     for matrix in (sensor.R, sensor.noise_covariance):
         formulas += [entry for row in matrix or () for entry in row]

@@ -188,8 +188,12 @@ GATE = Record(
             "probability",
             CONSTANT,
             "The vector is rejected when its normalised innovation squared exceeds the chi-square quantile "
-            "of this probability, between 0 and 1.",
-            required=True,
+            "of this probability, between 0 and 1; exactly one of `probability` and `threshold`.",
+        ),
+        Key(
+            "threshold",
+            Formula("gate"),
+            "What the normalised innovation squared may not exceed, whichever components are used; greater than 0.",
         ),
         Key(
             "reset_after",

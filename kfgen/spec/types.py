@@ -124,7 +124,10 @@ class Component:
 
 @dataclass(frozen=True)
 class Gate:
-    probability: Expression
+    """Exactly one of the first two is given."""
+
+    probability: Expression | None
+    threshold: Expression | None = None
     reset_after: int | None = None
 
 

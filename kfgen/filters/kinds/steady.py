@@ -11,7 +11,7 @@ from kfgen.filters.algebra.riccati import Gain, Rules, Scalar, steady
 from kfgen.filters.base import CONST_KF, INPUTS, KF, FilterCode, sensor_argument
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
-from kfgen.filters.steps.gate import gate, store_outcome
+from kfgen.filters.steps.gate import gate, store_outcome, tested
 from kfgen.filters.steps.sensor import SensorCode, needs_inputs, total
 from kfgen.filters.steps.state import StateCode
 from kfgen.ir.program import Argument, Function
@@ -88,6 +88,7 @@ class Steady:
         if needs_inputs(model, sensor):
             arguments.append(INPUTS)
         guards.arguments(t)
+        tested(t, model, [sensor])
         self.state.initialize(t, sensor, None)
         t.section("innovation")
         code = SensorCode(t, model, sensor, list(range(self.n)))

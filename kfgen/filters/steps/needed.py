@@ -52,6 +52,8 @@ def _formulas(model: Model, sensor: SensorModel) -> Iterable[tuple[Places, list[
         for i, row in enumerate(sensor.R):
             for j, entry in enumerate(row):
                 yield frozenset({i, j}), [entry]
+    if sensor.gate is not None and sensor.gate.threshold is not None:
+        yield frozenset(), [sensor.gate.threshold]
     influence = model.options.influence
     if influence is not None and influence.psi is not None:
         yield frozenset(), [influence.psi, influence.slope]

@@ -13,6 +13,7 @@ from typing import Any
 from kfgen.filters.base import DT, INPUTS, KF, MASK, sensor_argument
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
+from kfgen.filters.steps.gate import tested
 from kfgen.filters.steps.needed import needed
 from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.sensor import needs_inputs
@@ -77,6 +78,7 @@ def begin_update(
     if any(needs_inputs(model, sensor) for model, sensor in zip(models, sensors, strict=True)):
         arguments.append(INPUTS)
     guards.arguments(t, needed(models, sensors, used))
+    tested(t, models[0], sensors)
     if partial:
         arguments.append(MASK)
     return arguments, used

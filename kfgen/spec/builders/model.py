@@ -121,13 +121,20 @@ class ModelBuilder:
             matrix(f.get("R")),
             noise,
             matrix(f.get("noise_covariance")),
-            Gate(self.values.formula(gate, "probability"), self.values.number(gate.get("reset_after")))
-            if isinstance(gate, Fields)
-            else None,
+            self.gate(gate) if isinstance(gate, Fields) else None,
             f.get("partial", False),
             f.get("doc", ""),
             f.place,
         )
+
+    def gate(self, f: Fields) -> Gate:
+        given = [key for key in ("probability", "threshold") if key in f]
+        if len(given) == 2:
+            text = "`probability` and `threshold` are given both"
+            self.problems.add(f.places["threshold"], text, "remove one of them")
+        elif not given and not f.bad:
+            self.problems.add(f.place, "`probability` or `threshold` is missing", "write `probability: 0.999`")
+        return Gate(f.get("probability"), f.get("threshold"), self.values.number(f.get("reset_after")))
 
     def component(self, name: str, f: Fields, covered: bool, noisy: bool) -> Component:
         kind, period = self.values.kind(f)

@@ -180,6 +180,7 @@ def _sensor(facts: Facts, sensor: Sensor) -> None:
             facts.check_range(component.period, "the period", 0)
     if sensor.gate is not None:
         facts.check_range(sensor.gate.probability, "the probability", 0, 1)
+        facts.check_range(sensor.gate.threshold, "the threshold", 0)
 
 
 def _filter(facts: Facts, chosen: Filter) -> None:
