@@ -238,14 +238,15 @@ class ReferenceFilter:
     def _judge(self, reading: Reading) -> Status:
         """An update behind the gate: the whole vector, or nothing of it."""
         name = reading.sensor.name
-        innovation = self.algorithm.innovate(self._estimate, reading)
+        algorithm = self.algorithm.of(name)
+        innovation = algorithm.innovate(self._estimate, reading)
         every = self.algorithm.nis_of_modes(innovation)
         verdict = self.algorithm.judge(innovation, reading, self.gate_count[name])
         if verdict == Status.GATED:
             self.nis, self.nis_of_modes = innovation.nis, every
             self.gate_count[name] += 1
             return verdict
-        correction: Correction = self.algorithm.correct(self._estimate, reading, innovation)
+        correction: Correction = algorithm.correct(self._estimate, reading, innovation)
         self._estimate = correction.estimate
         self.nis, self.log_likelihood = innovation.nis, correction.log_likelihood
         self.nis_of_modes = every

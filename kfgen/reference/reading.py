@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from kfgen.reference.evaluate import renamed
 from kfgen.spec.modes import mode_specs
+from kfgen.spec.sensors import filter_of
 from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Matrix, Noise, Sensor, Spec
 
@@ -53,14 +54,14 @@ def read_by_update(spec: Spec, sensor: str, used: Sequence[int] | None = None) -
     if spec.imm is not None:
         return Names().union(*(read_by_update(mode, sensor, used) for mode in mode_specs(spec)))
     (whole,) = [each for each in spec.measurements if each.name == sensor]
-    own = whole if used is None else _part(whole, used)
+    own, chosen = whole if used is None else _part(whole, used), filter_of(spec.filter, whole)
     formulas = [component.h for component in own.components]
     if spec.filter.gain is None:
         formulas += _noise(in_use(spec, own.noise, formulas), own.noise_covariance)
-        if spec.filter.adapt_R is None:
+        if chosen.adapt_R is None:
             formulas += _own_noise(own)
     residuals = [renamed(c.residual.tree, _HIDDEN) for c in own.components if c.residual is not None]
-    robust = spec.filter.robust
+    robust = chosen.robust
     psi = [] if robust is None else [e.tree for e in (robust.psi, robust.psi_dot) if e is not None]
     if own.gate is not None and own.gate.threshold is not None:
         formulas.append(own.gate.threshold)

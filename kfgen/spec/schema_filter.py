@@ -90,6 +90,8 @@ ROBUST = Record(
     ),
 )
 
+ROBUSTNESS = Either(scalar=Choice(("none", "chernodarov", "huber")), mapping=ROBUST)
+
 ADAPTIVE = Record(
     "adaptive",
     (
@@ -167,7 +169,7 @@ FILTER = Record(
         ),
         Key(
             "robust",
-            Either(scalar=Choice(("none", "chernodarov", "huber")), mapping=ROBUST),
+            ROBUSTNESS,
             "Reduces the weight of large innovations; with a ukf only `ud` and `sequential`.",
             "none",
             only=_PER_SCALAR,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from kfgen.spec.schema_filter import ADAPTIVE, ROBUSTNESS
 from kfgen.spec.shapes import (
     Choice,
     Either,
@@ -219,6 +220,14 @@ SENSOR = Record(
             "The full covariance of these noise inputs, instead of std or var.",
         ),
         Key("gate", GATE, "Rejection of outliers."),
+        Key("robust", ROBUSTNESS, "In place of the filter's; `none`: off.", "the filter's"),
+        Key(
+            "adaptive",
+            Either(scalar=Flag(off="none"), mapping=ADAPTIVE),
+            "In place of the filter's; `none`: off.",
+            "the filter's",
+        ),
+        Key("adapt_R", Formula(words=("none",)), "In place of the filter's; `none`: off.", "the filter's"),
         Key("partial", Flag(), "Also emit update_<sensor>_masked, for some of the components.", "false"),
         DOC,
     ),

@@ -50,7 +50,9 @@ class Choice:
 
 @dataclass(frozen=True)
 class Flag:
-    """true or false."""
+    """true or false; `off` is another word for false."""
+
+    off: str = ""
 
 
 @dataclass(frozen=True)

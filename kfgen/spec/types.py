@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from kfgen.errors import NOWHERE, Place
 from kfgen.scalar_names import FLOAT
@@ -140,6 +141,7 @@ class Sensor:
     noise_covariance: Matrix | None = None
     gate: Gate | None = None
     partial: bool = False
+    own: Mapping[str, Any] = field(default_factory=dict)  # robust, adaptive, adapt_R where they are not the filter's
     doc: str = ""
     place: Place = NOWHERE
 

@@ -219,13 +219,14 @@ class Imm:
         """Each mode updated; mu_j <- mu_j exp(l_j), normalised."""
         t = BankTrace(self.scalar.smallest)
         sensors = [self._sensor(mode, k) for mode in self.modes]
-        arguments, used = begin_update(t, [mode.model for mode in self.modes], sensors, partial)
+        models = [mode.model.of(sensor) for mode, sensor in zip(self.modes, sensors, strict=True)]
+        arguments, used = begin_update(t, models, sensors, partial)
         self.state.initialize(t, sensors[0], used)
         scopes = [mode.scope() for mode in self.modes]
         runs: list[tuple[Scope, Phases]] = []
         first: list[Judged | Made] = []
         for mode, scope, sensor in zip(self.modes, scopes, sensors, strict=True):
-            runs.append((scope, mode.filter.updating(t, sensor, used)))
+            runs.append((scope, mode.filter.of(sensor).updating(t, sensor, used)))
             first.append(_advance(t, *runs[-1]))
         t.settle()
         judged = [phase.nis for phase in first if phase.nis is not None]
@@ -238,8 +239,7 @@ class Imm:
             made.append(phase)
         t.settle()
         mu, log_likelihood = self.weighed(t, made)
-        x = self.combined(t, made, mu)
-        self._store(t, runs, x, mu)
+        self._store(t, runs, self.combined(t, made, mu), mu)
         store_outcome(t, self.model, sensors, judged, log_likelihood, fields)
         guards.settled(t, self.model)
         name, doc = update_name(sensors[0], partial)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from kfgen.spec.builders.filter import FilterBuilder
 from kfgen.spec.builders.values import Values
 from kfgen.spec.raw import Fields, Word, entries, limits, matrix
 from kfgen.spec.tree import names
@@ -123,9 +124,23 @@ class ModelBuilder:
             matrix(f.get("noise_covariance")),
             self.gate(gate) if isinstance(gate, Fields) else None,
             f.get("partial", False),
+            self.own(f),
             f.get("doc", ""),
             f.place,
         )
+
+    def own(self, f: Fields) -> dict[str, Any]:
+        """The options of the filter that a sensor has of its own."""
+        options = FilterBuilder(self.values)
+        found: dict[str, Any] = {}
+        if "robust" in f:
+            found["robust"] = options.robust(f)
+        if "adaptive" in f:
+            found["adaptive"] = options.adaptive(f)
+        if "adapt_R" in f:
+            rate = f.get("adapt_R")
+            found["adapt_R"] = None if rate is None or rate.text == "none" else rate
+        return found
 
     def gate(self, f: Fields) -> Gate:
         given = [key for key in ("probability", "threshold") if key in f]
