@@ -76,8 +76,8 @@ class SensorModel:
         environment = self.model.environment(context, x, dict(zip(self._noises, e, strict=True)))
         return [self._h[i](environment) for i in used]
 
-    def linearise(self, x: Vector, reading: Reading) -> Linearisation:
-        """h, H and R + M Re M^T at x (n), M = dh/de at e = 0. Raises StepError NOT_FINITE.
+    def linearise(self, x: Vector, reading: Reading, learnt: bool = False) -> Linearisation:
+        """h, H and R + M Re M^T at x (n), M = dh/de at e = 0; learnt: without R. Raises StepError NOT_FINITE.
 
         Whether R is a covariance is for the update to judge, after all that could be not finite.
         """
@@ -87,7 +87,7 @@ class SensorModel:
         derivatives = jacobian(predicted, n + k)
         h, H, M = values(predicted), derivatives[:, :n], derivatives[:, n:]
         inputs = M @ self.input_covariance(x, reading.context) @ M.T
-        R = symmetric(self.noise(x, reading.context, reading.used) + inputs)
+        R = symmetric(inputs if learnt else self.noise(x, reading.context, reading.used) + inputs)
         if not (np.isfinite(h).all() and np.isfinite(H).all() and np.isfinite(R).all()):
             raise StepError(Status.NOT_FINITE)
         return Linearisation(h, H, R, symmetric(inputs))

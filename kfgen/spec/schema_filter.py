@@ -184,7 +184,8 @@ FILTER = Record(
         Key(
             "adapt_R",
             _CONSTANT,
-            "Forgetting factor of the innovation-based adjustment of R, between 0 and 1; R must be constant.",
+            "Forgetting factor of the innovation-based adjustment of R, between 0 and 1; R may use constants and "
+            "parameters, at their spec values.",
             "off",
             only=_PER_SCALAR,
         ),

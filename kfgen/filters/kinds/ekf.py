@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any
 
 from kfgen.filters.algebra.linalg import Vector, dot, plus
-from kfgen.filters.algebra.numbers import is_positive, require_nonnegative
+from kfgen.filters.algebra.numbers import assume_positive, is_positive, positive_within, require_nonnegative
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.noise import Additive, Given
@@ -157,12 +157,18 @@ class Ekf(SingleFilter):
         if u.used is not None:
             own = masked(u.t, linear, linear.R, u.used)[1]
             linear, R = masked(u.t, linear, R, u.used)
-            if linear.computed and any(r.constant is None for row in linear.R for r in row):
+            if u.adapted is None and linear.computed and any(r.constant is None for row in linear.R for r in row):
                 Given(own).factors()  # what was added might hide that R is no covariance
         innovation = decorrelated(u.t, linear, R, u.used, smallest)
         for r in innovation.variances:
             require_nonnegative(r, "a measurement variance is negative")
+            self.suppose(r)
         return innovation
+
+    def suppose(self, r: Value) -> None:
+        """Take a variance for positive that is not 0 within the declared ranges: 0 is then no case of its own."""
+        if self.scalar.uniform and not is_positive(r) and positive_within(r, process.declared_signs(self.model)):
+            assume_positive(r)
 
     def spread(self, u: Update, linear: Linearised) -> Symmetric:
         """H P H^T."""

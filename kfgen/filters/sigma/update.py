@@ -172,6 +172,7 @@ class _Whole:
         if u.adapted is None and any(r.constant is None for row in self.R for r in row):
             for d in decorrelated(u.t, linear, self.R).variances:
                 require_nonnegative(d, "R is not positive semidefinite")
+                ukf.suppose(d)
         diagonal = all(is_zero(self.R[i][j]) for i in range(m) for j in range(m) if i != j)
         self.definite = seeing.points.positive and seeing.points.exact
         self.sure = diagonal and all(is_positive(self.R[i][i]) for i in range(m)) and self.definite

@@ -200,10 +200,13 @@ def _measurement_noise(sensor: Sensor) -> list[Expression]:
     return found + _entries(sensor.R) + _entries(sensor.noise_covariance)
 
 
-def _constant(facts: Facts, model: Model, entries: list[Expression], key: str, what: str) -> None:
-    """One mistake per matrix, at the first entry that varies."""
+def _constant(
+    facts: Facts, model: Model, entries: list[Expression], key: str, what: str, allowed: str = ""
+) -> None:
+    """One mistake per matrix, at the first entry that varies. allowed: a kind of name that may."""
     for entry in entries:
-        varying = _varying(model, model.context.uses(entry))
+        uses = frozenset(name for name in model.context.uses(entry) if model.context.kinds.get(name) != allowed)
+        varying = _varying(model, uses)
         if varying:
             facts.add(entry.place, f"{what} varies with {varying}, but `{key}` wants it constant", "use constants")
             return
@@ -211,4 +214,4 @@ def _constant(facts: Facts, model: Model, entries: list[Expression], key: str, w
 
 def _constant_R(facts: Facts, model: Model, sensor: Sensor) -> None:
     entries = [c.variance for c in sensor.components if c.variance is not None] + _entries(sensor.R)
-    _constant(facts, model, entries, "adapt_R", f"R of {short(sensor.name)}")
+    _constant(facts, model, entries, "adapt_R", f"R of {short(sensor.name)}", "parameter")
