@@ -1,14 +1,19 @@
 /* kfgen build ahrs.yaml */
 #include "ahrs.h"
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "ahrs tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "ahrs tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool ahrs_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 ahrs_status_t ahrs_init(ahrs_t *kf)
@@ -1305,7 +1310,7 @@ ahrs_status_t ahrs_set_covariance(ahrs_t *kf, const ahrs_real_t P[49])
     for (int j = 7 - 1; j >= 0; j--) {
         const float round_off = 8.34465e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return AHRS_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return AHRS_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -1350,4 +1355,4 @@ void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[49])
         }
     }
 }
-/* kfgen: body 999efe2af663e5dcf2900781616cf8c2 */
+/* kfgen: body e4f5390a723deafb5686f9a8997b41fd */

@@ -1,8 +1,10 @@
 /* kfgen build battery.yaml */
 #include "battery.h"
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "battery tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "battery tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
 /* constants: in flash on AVR too, where what is only const takes RAM */
@@ -38,10 +40,13 @@ static const float battery_table0_slope[25] BATTERY_flash = {
     3.02f, 14.103333f, 0.0f
 };
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool battery_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 /* the segment of a table in which a lies: 0 before the first of n points, n from the last one on */
@@ -135,6 +140,8 @@ battery_status_t battery_update_terminal(battery_t *kf,
                                          const battery_inputs_t *u)
 {
     if (kf == NULL || z == NULL || u == NULL) { return BATTERY_NULL_ARGUMENT; }
+
+    /* arguments */
     if (!battery_finite(u->current)) { return BATTERY_NOT_FINITE; }
 
     /* innovation */
@@ -204,7 +211,7 @@ battery_status_t battery_update_terminal(battery_t *kf,
     if (t1 < 0.0f) { /* a measurement variance is negative */
         return BATTERY_NOT_POSITIVE;
     }
-    if (!battery_finite(y_voltage + t26 + v_fast_next + v_slow_next + nis + soc_next)) {
+    if (!battery_finite(y_voltage + t26 + v_fast_next + v_slow_next + nis + soc_next + s_voltage)) {
         return BATTERY_NOT_FINITE;
     }
     if (s_voltage < 0.0f) { return BATTERY_NOT_POSITIVE; }
@@ -255,7 +262,7 @@ battery_status_t battery_set_covariance(battery_t *kf, const battery_real_t P[9]
     for (int j = 3 - 1; j >= 0; j--) {
         const float round_off = 3.5762787e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return BATTERY_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return BATTERY_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -300,4 +307,4 @@ void battery_get_covariance(const battery_t *kf, battery_real_t P[9])
         }
     }
 }
-/* kfgen: body 910c8a1069a44483c947b602473f9f6e */
+/* kfgen: body bdbd651582388cebcaca71f67bb38c35 */

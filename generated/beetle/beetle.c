@@ -3,14 +3,19 @@
 
 #include <math.h>
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "beetle tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "beetle tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool beetle_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 static float beetle_min(float a, float b)
@@ -53,6 +58,7 @@ beetle_status_t beetle_init(beetle_t *kf)
     kf->modes.run.D[1] = 2500.0f;
     kf->modes.run.D[2] = 1.0f;
     kf->modes.run.D[3] = 0.49f;
+    kf->modes.run.nis = 0.0f;
     kf->modes.turn.x[BEETLE_PX] = 0.0f;
     kf->modes.turn.x[BEETLE_PY] = 0.0f;
     kf->modes.turn.x[BEETLE_V] = 5.0f;
@@ -64,6 +70,7 @@ beetle_status_t beetle_init(beetle_t *kf)
     kf->modes.turn.D[1] = 2500.0f;
     kf->modes.turn.D[2] = 1.0f;
     kf->modes.turn.D[3] = 0.49f;
+    kf->modes.turn.nis = 0.0f;
     kf->nis = 0.0f;
     kf->initialized = false;
     kf->parameters.pace = 5.0f;
@@ -90,6 +97,10 @@ beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt)
 {
     if (kf == NULL) { return BEETLE_NULL_ARGUMENT; }
     beetle_status_t flags = BEETLE_OK;
+
+    /* arguments */
+    if (!beetle_finite(kf->parameters.pace)) { return BEETLE_NOT_FINITE; }
+    if (!beetle_finite(kf->parameters.lasts)) { return BEETLE_NOT_FINITE; }
     if (!beetle_finite(dt)) { return BEETLE_NOT_FINITE; }
     const bool t0 = dt < 0.01f;
     if (t0) { flags |= BEETLE_DT_CLAMPED; }
@@ -558,7 +569,7 @@ beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt)
     const float t240 = beetle_wrap(th_next_turn, 3.1415927f);
 
     /* turn: guards */
-    if (!beetle_finite(px_next_turn + py_next_turn + v_next_turn + t240 + d_px_next_turn_1
+    if (!beetle_finite(px_next_turn + py_next_turn + v_next_turn + th_next_turn + d_px_next_turn_1
         + d_py_next_turn_1 + d_v_next_turn_1 + d_th_next_turn_1)) {
         return BEETLE_NOT_FINITE;
     }
@@ -723,7 +734,8 @@ beetle_status_t beetle_update_camera(beetle_t *kf, const beetle_camera_t *z)
     const float t42 = beetle_wrap(th_next_run, 3.1415927f);
 
     /* run: guards */
-    if (!beetle_finite(px_next_run + py_next_run + v_next_run + t42 + nis_run)) {
+    if (!beetle_finite(px_next_run + py_next_run + v_next_run + th_next_run + nis_run + s_x_run
+        + s_y_run)) {
         return BEETLE_NOT_FINITE;
     }
 
@@ -812,7 +824,8 @@ beetle_status_t beetle_update_camera(beetle_t *kf, const beetle_camera_t *z)
     const float t85 = beetle_wrap(th_next_turn, 3.1415927f);
 
     /* turn: guards */
-    if (!beetle_finite(px_next_turn + py_next_turn + v_next_turn + t85 + nis_turn)) {
+    if (!beetle_finite(px_next_turn + py_next_turn + v_next_turn + th_next_turn + nis_turn
+        + s_x_turn + s_y_turn)) {
         return BEETLE_NOT_FINITE;
     }
     if (!(s_x_run > 0.0f) || !(s_y_run > 0.0f)) { return BEETLE_NOT_POSITIVE; }
@@ -886,6 +899,8 @@ beetle_status_t beetle_update_camera(beetle_t *kf, const beetle_camera_t *z)
     kf->x[BEETLE_PY] = py_all;
     kf->x[BEETLE_V] = v_all;
     kf->x[BEETLE_TH] = beetle_wrap(th_all, 3.1415927f);
+    kf->modes.run.nis = nis_run;
+    kf->modes.turn.nis = nis_turn;
     kf->nis = beetle_min(nis_run, nis_turn);
     return BEETLE_OK;
 }
@@ -933,7 +948,7 @@ beetle_status_t beetle_set_covariance(beetle_t *kf, const beetle_real_t P[16])
     for (int j = 4 - 1; j >= 0; j--) {
         const float round_off_run = 4.7683716e-7f * p_run[j * (j + 1) / 2 + j];
         const float pivot_run = w_run[j * (j + 1) / 2 + j];
-        if (pivot_run < -round_off_run) { return BEETLE_NOT_POSITIVE; }
+        if (!(-round_off_run <= pivot_run)) { return BEETLE_NOT_POSITIVE; }
         const float d_run = round_off_run < pivot_run ? pivot_run : 0.0f;
         w_run[j * (j + 1) / 2 + j] = d_run;
         for (int i = j - 1; i >= 0; i--) {
@@ -1039,4 +1054,4 @@ void beetle_get_covariance(const beetle_t *kf, beetle_real_t P[16])
         }
     }
 }
-/* kfgen: body e5453c7041d3a8970f1227f93c5d94a7 */
+/* kfgen: body bcbc05caf1a9d38c4f128192ac11cb2a */

@@ -1,8 +1,10 @@
 /* kfgen build cv2d.yaml */
 #include "cv2d.h"
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "cv2d tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "cv2d tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
 /* constants: in flash on AVR too, where what is only const takes RAM */
@@ -20,10 +22,13 @@ static const uint8_t cv2d_order[4] CV2D_flash = {
     0, 2, 1, 3
 };
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool cv2d_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 cv2d_status_t cv2d_init(cv2d_t *kf)
@@ -303,7 +308,7 @@ cv2d_status_t cv2d_set_covariance(cv2d_t *kf, const cv2d_real_t P[16])
     for (int j = 4 - 1; j >= 0; j--) {
         const float round_off = 4.7683716e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return CV2D_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return CV2D_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -348,4 +353,4 @@ void cv2d_get_covariance(const cv2d_t *kf, cv2d_real_t P[16])
         }
     }
 }
-/* kfgen: body 72f7183a3eb481d7371c71a5cb5213fb */
+/* kfgen: body 94e142efe89abd43e8c0455054280cf4 */

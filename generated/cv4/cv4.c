@@ -1,8 +1,10 @@
 /* kfgen build cv4.yaml */
 #include "cv4.h"
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "cv4 tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "cv4 tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
 /* constants: in flash on AVR too, where what is only const takes RAM */
@@ -20,10 +22,13 @@ static const uint8_t cv4_order[4] CV4_flash = {
     0, 2, 1, 3
 };
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool cv4_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 cv4_status_t cv4_init(cv4_t *kf)
@@ -204,7 +209,9 @@ cv4_status_t cv4_update_position(cv4_t *kf, const cv4_position_t *z)
     const float vy_next = kf->x[CV4_VY] + t22 * y_x + t27 * nu_y;
 
     /* guards */
-    if (!cv4_finite(px_next + py_next + vx_next + vy_next + nis)) { return CV4_NOT_FINITE; }
+    if (!cv4_finite(px_next + py_next + vx_next + vy_next + nis + s_x + s_y)) {
+        return CV4_NOT_FINITE;
+    }
     if (!(s_x > 0.0f) || !(s_y > 0.0f)) { return CV4_NOT_POSITIVE; }
 
     /* store */
@@ -262,7 +269,7 @@ cv4_status_t cv4_set_covariance(cv4_t *kf, const cv4_real_t P[16])
     for (int j = 4 - 1; j >= 0; j--) {
         const float round_off = 4.7683716e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return CV4_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return CV4_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -307,4 +314,4 @@ void cv4_get_covariance(const cv4_t *kf, cv4_real_t P[16])
         }
     }
 }
-/* kfgen: body 15accf3d9b23c256c5957b0d6a38d457 */
+/* kfgen: body b91a3fa72dd3932f4a71d580d28e28b7 */

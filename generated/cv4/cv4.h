@@ -15,7 +15,7 @@
  *
  * RAM 60 bytes a filter. Operations:
  *   predict          45 mul, 29 add, 6 div
- *   update_position  58 mul, 40 add, 6 div, 2 compare
+ *   update_position  58 mul, 42 add, 6 div, 2 compare
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * 2c05ad735774c90d9fe1eeb701640aff030758bed3483e7adcc0817be532fe2f
@@ -99,7 +99,7 @@ cv4_status_t cv4_predict(cv4_t *kf);
  * @param z   x [m], y [m]
  * @return CV4_OK, or an error that leaves *kf as it was
  *
- * 58 mul, 40 add, 6 div, 2 compare.
+ * 58 mul, 42 add, 6 div, 2 compare.
  */
 cv4_status_t cv4_update_position(cv4_t *kf, const cv4_position_t *z);
 
@@ -134,4 +134,4 @@ void cv4_get_covariance(const cv4_t *kf, cv4_real_t P[16]);
 #endif
 
 #endif
-/* kfgen: body ed3ae06fac2a23f259d94501a7b6407d */
+/* kfgen: body 3c74f378c5fac47fcc608e23c67b649c */

@@ -3,8 +3,10 @@
 
 #include <math.h>
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "gps tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "gps tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
 /* constants: in flash on AVR too, where what is only const takes RAM */
@@ -22,10 +24,15 @@ static const uint8_t gps_order[5] GPS_flash = {
     4, 3, 0, 1, 2
 };
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool gps_finite(double a)
 {
-    return a - a >= 0.0;
+    /* of small processors: a float's */
+    const uint64_t exponent = sizeof a > 4u ? 0x7ff0000000000000u : 0x7f800000u;
+    union { double value; uint64_t bits; } view;
+    view.bits = 0u;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 gps_status_t gps_init(gps_t *kf)
@@ -51,20 +58,6 @@ gps_status_t gps_init(gps_t *kf)
 gps_status_t gps_predict(gps_t *kf, const gps_inputs_t *u)
 {
     if (kf == NULL || u == NULL) { return GPS_NULL_ARGUMENT; }
-
-    /* arguments */
-    if (!gps_finite(u->s1x)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s1y)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s1z)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s2x)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s2y)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s2z)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s3x)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s3y)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s3z)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s4x)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s4y)) { return GPS_NOT_FINITE; }
-    if (!gps_finite(u->s4z)) { return GPS_NOT_FINITE; }
     const double drift = kf->x[GPS_DRIFT];
 
     /* model */
@@ -139,6 +132,8 @@ gps_status_t gps_predict(gps_t *kf, const gps_inputs_t *u)
 gps_status_t gps_update_range(gps_t *kf, const gps_range_t *z, const gps_inputs_t *u)
 {
     if (kf == NULL || z == NULL || u == NULL) { return GPS_NULL_ARGUMENT; }
+
+    /* arguments */
     if (!gps_finite(u->s1x)) { return GPS_NOT_FINITE; }
     if (!gps_finite(u->s1y)) { return GPS_NOT_FINITE; }
     if (!gps_finite(u->s1z)) { return GPS_NOT_FINITE; }
@@ -383,7 +378,8 @@ gps_status_t gps_update_range(gps_t *kf, const gps_range_t *z, const gps_inputs_
     const double z_next = z_1 + t165 + t150 * nu_r4;
 
     /* guards */
-    if (!gps_finite(x_next + y_next + z_next + clock_next + drift_next + nis)) {
+    if (!gps_finite(x_next + y_next + z_next + clock_next + drift_next + nis + s_r1 + s_r2 + s_r3
+        + s_r4)) {
         return GPS_NOT_FINITE;
     }
     if (!(s_r1 > 0.0) || !(s_r2 > 0.0) || !(s_r3 > 0.0) || !(s_r4 > 0.0)) {
@@ -453,7 +449,7 @@ gps_status_t gps_set_covariance(gps_t *kf, const gps_real_t P[25])
     for (int j = 5 - 1; j >= 0; j--) {
         const double round_off = 1.1102230246251565e-15 * p[j * (j + 1) / 2 + j];
         const double pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return GPS_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return GPS_NOT_POSITIVE; }
         const double d = round_off < pivot ? pivot : 0.0;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -498,4 +494,4 @@ void gps_get_covariance(const gps_t *kf, gps_real_t P[25])
         }
     }
 }
-/* kfgen: body 3ecec075c5aeefbf9c4ad023ce0f4ad7 */
+/* kfgen: body 35ec02a49b459ad4d50d7f537897d7e6 */

@@ -16,7 +16,7 @@
  *
  * RAM 168 bytes a filter. Operations:
  *   predict       15 mul, 17 add, 2 div
- *   update_range  213 mul, 180 add, 20 div, 4 sqrt, 8 compare, 4 select
+ *   update_range  213 mul, 184 add, 20 div, 4 sqrt, 8 compare, 4 select
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * aa4d86c27f174e7e6eae0542e4b35a57de7f7372cb2d3087c7af2e47ca1ef513
@@ -123,7 +123,7 @@ gps_status_t gps_predict(gps_t *kf, const gps_inputs_t *u);
  *            [m], s4y [m], s4z [m]
  * @return GPS_OK, or an error that leaves *kf as it was
  *
- * 213 mul, 180 add, 20 div, 4 sqrt, 8 compare, 4 select.
+ * 213 mul, 184 add, 20 div, 4 sqrt, 8 compare, 4 select.
  */
 gps_status_t gps_update_range(gps_t *kf, const gps_range_t *z, const gps_inputs_t *u);
 
@@ -158,4 +158,4 @@ void gps_get_covariance(const gps_t *kf, gps_real_t P[25]);
 #endif
 
 #endif
-/* kfgen: body 3738fdb775c81ce1f511218e29d11023 */
+/* kfgen: body 2b7336ac1d3f27a37ee5052b90508e12 */

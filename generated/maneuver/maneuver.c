@@ -3,14 +3,19 @@
 
 #include <math.h>
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "maneuver tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "maneuver tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool maneuver_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 static float maneuver_min(float a, float b)
@@ -69,6 +74,7 @@ maneuver_status_t maneuver_init(maneuver_t *kf)
         kf->modes.cruise.P[i] = 0.0f;
     }
     kf->modes.cruise.P[20] = 0.0025f;
+    kf->modes.cruise.nis = 0.0f;
     kf->modes.speed.x[MANEUVER_PX] = 8000.0f;
     kf->modes.speed.x[MANEUVER_PY] = 6000.0f;
     kf->modes.speed.x[MANEUVER_V] = 120.0f;
@@ -93,6 +99,7 @@ maneuver_status_t maneuver_init(maneuver_t *kf)
         kf->modes.speed.P[i] = 0.0f;
     }
     kf->modes.speed.P[20] = 0.0025f;
+    kf->modes.speed.nis = 0.0f;
     kf->modes.turn.x[MANEUVER_PX] = 8000.0f;
     kf->modes.turn.x[MANEUVER_PY] = 6000.0f;
     kf->modes.turn.x[MANEUVER_V] = 120.0f;
@@ -117,6 +124,7 @@ maneuver_status_t maneuver_init(maneuver_t *kf)
         kf->modes.turn.P[i] = 0.0f;
     }
     kf->modes.turn.P[20] = 0.0025f;
+    kf->modes.turn.nis = 0.0f;
     kf->nis = 0.0f;
     kf->gate_count_radar = 0;
     return MANEUVER_OK;
@@ -568,9 +576,9 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     const float t77 = maneuver_wrap(th_next_turn, 3.1415927f);
 
     /* turn: guards */
-    if (!maneuver_finite(px_next_turn + py_next_turn + t77 + a_next_turn + p_px_px_next_turn_1
-        + p_py_py_next_turn_1 + p_v_v_next_turn_1 + p_th_th_next_turn_1 + p_a_a_next_turn_1
-        + p_w_w_next_turn_1)) {
+    if (!maneuver_finite(px_next_turn + py_next_turn + th_next_turn + a_next_turn
+        + p_px_px_next_turn_1 + p_py_py_next_turn_1 + p_v_v_next_turn_1 + p_th_th_next_turn_1
+        + p_a_a_next_turn_1 + p_w_w_next_turn_1)) {
         return MANEUVER_NOT_FINITE;
     }
     const float t78 = 1.0f / (c_cruise + c_speed + c_turn);
@@ -771,278 +779,281 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float t3 = py_cruise * t2;
     const float h_bearing_py_cruise = px_cruise * t2;
     const float y_range_cruise = z->range - h_range_cruise;
-    const float y_bearing_cruise = maneuver_wrap(z->bearing - h_bearing_cruise, 3.1415927f);
+    const float t4 = z->bearing - h_bearing_cruise;
+    const float y_bearing_cruise = maneuver_wrap(t4, 3.1415927f);
 
     /* cruise: gain and covariance: range */
     const float p_px_px_cruise = kf->modes.cruise.P[0];
     const float p_px_py_cruise = kf->modes.cruise.P[1];
-    const float t4 = p_px_px_cruise * h_range_px_cruise + p_px_py_cruise * h_range_py_cruise;
+    const float t5 = p_px_px_cruise * h_range_px_cruise + p_px_py_cruise * h_range_py_cruise;
     const float p_py_py_cruise = kf->modes.cruise.P[2];
-    const float t5 = p_px_py_cruise * h_range_px_cruise + p_py_py_cruise * h_range_py_cruise;
+    const float t6 = p_px_py_cruise * h_range_px_cruise + p_py_py_cruise * h_range_py_cruise;
     const float p_px_v_cruise = kf->modes.cruise.P[3];
     const float p_py_v_cruise = kf->modes.cruise.P[4];
-    const float t6 = p_px_v_cruise * h_range_px_cruise + p_py_v_cruise * h_range_py_cruise;
+    const float t7 = p_px_v_cruise * h_range_px_cruise + p_py_v_cruise * h_range_py_cruise;
     const float p_px_th_cruise = kf->modes.cruise.P[6];
     const float p_py_th_cruise = kf->modes.cruise.P[7];
-    const float t7 = p_px_th_cruise * h_range_px_cruise + p_py_th_cruise * h_range_py_cruise;
+    const float t8 = p_px_th_cruise * h_range_px_cruise + p_py_th_cruise * h_range_py_cruise;
     const float p_px_a_cruise = kf->modes.cruise.P[10];
     const float p_py_a_cruise = kf->modes.cruise.P[11];
-    const float t8 = p_px_a_cruise * h_range_px_cruise + p_py_a_cruise * h_range_py_cruise;
+    const float t9 = p_px_a_cruise * h_range_px_cruise + p_py_a_cruise * h_range_py_cruise;
     const float p_px_w_cruise = kf->modes.cruise.P[15];
     const float p_py_w_cruise = kf->modes.cruise.P[16];
-    const float t9 = p_px_w_cruise * h_range_px_cruise + p_py_w_cruise * h_range_py_cruise;
-    const float s_range_cruise = h_range_px_cruise * t4 + h_range_py_cruise * t5 + 400.0f;
-    const float t10 = 1.0f / s_range_cruise;
-    const float t11 = t4 * t10;
-    const float t12 = t5 * t10;
-    const float t13 = t6 * t10;
-    const float t14 = t7 * t10;
-    const float t15 = t8 * t10;
-    const float t16 = t9 * t10;
-    const float t17 = t11 * y_range_cruise;
+    const float t10 = p_px_w_cruise * h_range_px_cruise + p_py_w_cruise * h_range_py_cruise;
+    const float s_range_cruise = h_range_px_cruise * t5 + h_range_py_cruise * t6 + 400.0f;
+    const float t11 = 1.0f / s_range_cruise;
+    const float t12 = t5 * t11;
+    const float t13 = t6 * t11;
+    const float t14 = t7 * t11;
+    const float t15 = t8 * t11;
+    const float t16 = t9 * t11;
+    const float t17 = t10 * t11;
     const float t18 = t12 * y_range_cruise;
-    const float t19 = y_range_cruise * (y_range_cruise * t10);
+    const float t19 = t13 * y_range_cruise;
+    const float t20 = y_range_cruise * (y_range_cruise * t11);
 
     /* cruise: gain and covariance: bearing */
-    const float t20 = p_px_px_cruise - t11 * t4;
-    const float t21 = p_px_py_cruise - t11 * t5;
-    const float t22 = t21 * h_bearing_py_cruise - t20 * t3;
-    const float t23 = p_py_py_cruise - t12 * t5;
-    const float t24 = t23 * h_bearing_py_cruise - t21 * t3;
-    const float t25 = p_px_v_cruise - t11 * t6;
-    const float t26 = p_py_v_cruise - t12 * t6;
-    const float t27 = t26 * h_bearing_py_cruise - t25 * t3;
-    const float t28 = p_px_th_cruise - t11 * t7;
-    const float t29 = p_py_th_cruise - t12 * t7;
-    const float t30 = t29 * h_bearing_py_cruise - t28 * t3;
-    const float t31 = p_px_a_cruise - t11 * t8;
-    const float t32 = p_py_a_cruise - t12 * t8;
-    const float t33 = t32 * h_bearing_py_cruise - t31 * t3;
-    const float t34 = p_px_w_cruise - t11 * t9;
-    const float t35 = p_py_w_cruise - t12 * t9;
-    const float t36 = t35 * h_bearing_py_cruise - t34 * t3;
-    const float s_bearing_cruise = h_bearing_py_cruise * t24 - t3 * t22 + 1.0e-6f;
-    const float t37 = 1.0f / s_bearing_cruise;
-    const float t38 = t22 * t37;
-    const float t39 = t24 * t37;
-    const float t40 = t27 * t37;
-    const float t41 = t30 * t37;
-    const float t42 = t33 * t37;
-    const float t43 = t36 * t37;
-    const float nu_bearing_cruise = y_bearing_cruise - h_bearing_py_cruise * t18 + t3 * t17;
-    const float t44 = nu_bearing_cruise * (nu_bearing_cruise * t37);
-    const float nis_cruise = t19 + t44;
+    const float t21 = p_px_px_cruise - t12 * t5;
+    const float t22 = p_px_py_cruise - t12 * t6;
+    const float t23 = t22 * h_bearing_py_cruise - t21 * t3;
+    const float t24 = p_py_py_cruise - t13 * t6;
+    const float t25 = t24 * h_bearing_py_cruise - t22 * t3;
+    const float t26 = p_px_v_cruise - t12 * t7;
+    const float t27 = p_py_v_cruise - t13 * t7;
+    const float t28 = t27 * h_bearing_py_cruise - t26 * t3;
+    const float t29 = p_px_th_cruise - t12 * t8;
+    const float t30 = p_py_th_cruise - t13 * t8;
+    const float t31 = t30 * h_bearing_py_cruise - t29 * t3;
+    const float t32 = p_px_a_cruise - t12 * t9;
+    const float t33 = p_py_a_cruise - t13 * t9;
+    const float t34 = t33 * h_bearing_py_cruise - t32 * t3;
+    const float t35 = p_px_w_cruise - t12 * t10;
+    const float t36 = p_py_w_cruise - t13 * t10;
+    const float t37 = t36 * h_bearing_py_cruise - t35 * t3;
+    const float s_bearing_cruise = h_bearing_py_cruise * t25 - t3 * t23 + 1.0e-6f;
+    const float t38 = 1.0f / s_bearing_cruise;
+    const float t39 = t23 * t38;
+    const float t40 = t25 * t38;
+    const float t41 = t28 * t38;
+    const float t42 = t31 * t38;
+    const float t43 = t34 * t38;
+    const float t44 = t37 * t38;
+    const float nu_bearing_cruise = y_bearing_cruise - h_bearing_py_cruise * t19 + t3 * t18;
+    const float t45 = nu_bearing_cruise * (nu_bearing_cruise * t38);
+    const float nis_cruise = t20 + t45;
 
     /* cruise: state and innovation squared */
-    const float t45 = 0.5f * (t19 + logf(s_range_cruise) + 1.837877f + t44 + logf(s_bearing_cruise)
+    const float t46 = 0.5f * (t20 + logf(s_range_cruise) + 1.837877f + t45 + logf(s_bearing_cruise)
         + 1.837877f);
-    const float l_cruise = -t45;
-    const float px_next_cruise = px_cruise + t17 + t38 * nu_bearing_cruise;
-    const float py_next_cruise = py_cruise + t18 + t39 * nu_bearing_cruise;
-    const float v_next_cruise = kf->modes.cruise.x[MANEUVER_V] + t13 * y_range_cruise
-        + t40 * nu_bearing_cruise;
-    const float th_next_cruise = kf->modes.cruise.x[MANEUVER_TH] + t14 * y_range_cruise
+    const float l_cruise = -t46;
+    const float px_next_cruise = px_cruise + t18 + t39 * nu_bearing_cruise;
+    const float py_next_cruise = py_cruise + t19 + t40 * nu_bearing_cruise;
+    const float v_next_cruise = kf->modes.cruise.x[MANEUVER_V] + t14 * y_range_cruise
         + t41 * nu_bearing_cruise;
-    const float a_next_cruise = kf->modes.cruise.x[MANEUVER_A] + t15 * y_range_cruise
+    const float th_next_cruise = kf->modes.cruise.x[MANEUVER_TH] + t15 * y_range_cruise
         + t42 * nu_bearing_cruise;
-    const float w_next_cruise = kf->modes.cruise.x[MANEUVER_W] + t16 * y_range_cruise
+    const float a_next_cruise = kf->modes.cruise.x[MANEUVER_A] + t16 * y_range_cruise
         + t43 * nu_bearing_cruise;
-    const float t46 = maneuver_wrap(th_next_cruise, 3.1415927f);
+    const float w_next_cruise = kf->modes.cruise.x[MANEUVER_W] + t17 * y_range_cruise
+        + t44 * nu_bearing_cruise;
+    const float t47 = maneuver_wrap(th_next_cruise, 3.1415927f);
 
     /* cruise: guards */
-    if (!maneuver_finite(y_range_cruise + y_bearing_cruise + s_range_cruise + s_bearing_cruise)) {
+    if (!maneuver_finite(y_range_cruise + t4 + s_range_cruise + s_bearing_cruise)) {
         return MANEUVER_NOT_FINITE;
     }
 
     /* speed: innovation */
     const float px_speed = kf->modes.speed.x[MANEUVER_PX];
     const float py_speed = kf->modes.speed.x[MANEUVER_PY];
-    const float t47 = px_speed * px_speed + py_speed * py_speed;
-    const float h_range_speed = sqrtf(t47);
-    const float t48 = h_range_speed > 0.0f ? 1.0f / h_range_speed : 0.0f;
-    const float h_range_px_speed = px_speed * t48;
-    const float h_range_py_speed = py_speed * t48;
+    const float t48 = px_speed * px_speed + py_speed * py_speed;
+    const float h_range_speed = sqrtf(t48);
+    const float t49 = h_range_speed > 0.0f ? 1.0f / h_range_speed : 0.0f;
+    const float h_range_px_speed = px_speed * t49;
+    const float h_range_py_speed = py_speed * t49;
     const float h_bearing_speed = atan2f(py_speed, px_speed);
-    const float t49 = t47 > 0.0f ? 1.0f / t47 : 0.0f;
-    const float t50 = py_speed * t49;
-    const float h_bearing_py_speed = px_speed * t49;
+    const float t50 = t48 > 0.0f ? 1.0f / t48 : 0.0f;
+    const float t51 = py_speed * t50;
+    const float h_bearing_py_speed = px_speed * t50;
     const float y_range_speed = z->range - h_range_speed;
-    const float y_bearing_speed = maneuver_wrap(z->bearing - h_bearing_speed, 3.1415927f);
+    const float t52 = z->bearing - h_bearing_speed;
+    const float y_bearing_speed = maneuver_wrap(t52, 3.1415927f);
 
     /* speed: gain and covariance: range */
     const float p_px_px_speed = kf->modes.speed.P[0];
     const float p_px_py_speed = kf->modes.speed.P[1];
-    const float t51 = p_px_px_speed * h_range_px_speed + p_px_py_speed * h_range_py_speed;
+    const float t53 = p_px_px_speed * h_range_px_speed + p_px_py_speed * h_range_py_speed;
     const float p_py_py_speed = kf->modes.speed.P[2];
-    const float t52 = p_px_py_speed * h_range_px_speed + p_py_py_speed * h_range_py_speed;
+    const float t54 = p_px_py_speed * h_range_px_speed + p_py_py_speed * h_range_py_speed;
     const float p_px_v_speed = kf->modes.speed.P[3];
     const float p_py_v_speed = kf->modes.speed.P[4];
-    const float t53 = p_px_v_speed * h_range_px_speed + p_py_v_speed * h_range_py_speed;
+    const float t55 = p_px_v_speed * h_range_px_speed + p_py_v_speed * h_range_py_speed;
     const float p_px_th_speed = kf->modes.speed.P[6];
     const float p_py_th_speed = kf->modes.speed.P[7];
-    const float t54 = p_px_th_speed * h_range_px_speed + p_py_th_speed * h_range_py_speed;
+    const float t56 = p_px_th_speed * h_range_px_speed + p_py_th_speed * h_range_py_speed;
     const float p_px_a_speed = kf->modes.speed.P[10];
     const float p_py_a_speed = kf->modes.speed.P[11];
-    const float t55 = p_px_a_speed * h_range_px_speed + p_py_a_speed * h_range_py_speed;
+    const float t57 = p_px_a_speed * h_range_px_speed + p_py_a_speed * h_range_py_speed;
     const float p_px_w_speed = kf->modes.speed.P[15];
     const float p_py_w_speed = kf->modes.speed.P[16];
-    const float t56 = p_px_w_speed * h_range_px_speed + p_py_w_speed * h_range_py_speed;
-    const float s_range_speed = h_range_px_speed * t51 + h_range_py_speed * t52 + 400.0f;
-    const float t57 = 1.0f / s_range_speed;
-    const float t58 = t51 * t57;
-    const float t59 = t52 * t57;
-    const float t60 = t53 * t57;
-    const float t61 = t54 * t57;
-    const float t62 = t55 * t57;
-    const float t63 = t56 * t57;
-    const float t64 = t58 * y_range_speed;
-    const float t65 = t59 * y_range_speed;
-    const float t66 = y_range_speed * (y_range_speed * t57);
+    const float t58 = p_px_w_speed * h_range_px_speed + p_py_w_speed * h_range_py_speed;
+    const float s_range_speed = h_range_px_speed * t53 + h_range_py_speed * t54 + 400.0f;
+    const float t59 = 1.0f / s_range_speed;
+    const float t60 = t53 * t59;
+    const float t61 = t54 * t59;
+    const float t62 = t55 * t59;
+    const float t63 = t56 * t59;
+    const float t64 = t57 * t59;
+    const float t65 = t58 * t59;
+    const float t66 = t60 * y_range_speed;
+    const float t67 = t61 * y_range_speed;
+    const float t68 = y_range_speed * (y_range_speed * t59);
 
     /* speed: gain and covariance: bearing */
-    const float t67 = p_px_px_speed - t58 * t51;
-    const float t68 = p_px_py_speed - t58 * t52;
-    const float t69 = t68 * h_bearing_py_speed - t67 * t50;
-    const float t70 = p_py_py_speed - t59 * t52;
-    const float t71 = t70 * h_bearing_py_speed - t68 * t50;
-    const float t72 = p_px_v_speed - t58 * t53;
-    const float t73 = p_py_v_speed - t59 * t53;
-    const float t74 = t73 * h_bearing_py_speed - t72 * t50;
-    const float t75 = p_px_th_speed - t58 * t54;
-    const float t76 = p_py_th_speed - t59 * t54;
-    const float t77 = t76 * h_bearing_py_speed - t75 * t50;
-    const float t78 = p_px_a_speed - t58 * t55;
-    const float t79 = p_py_a_speed - t59 * t55;
-    const float t80 = t79 * h_bearing_py_speed - t78 * t50;
-    const float t81 = p_px_w_speed - t58 * t56;
-    const float t82 = p_py_w_speed - t59 * t56;
-    const float t83 = t82 * h_bearing_py_speed - t81 * t50;
-    const float s_bearing_speed = h_bearing_py_speed * t71 - t50 * t69 + 1.0e-6f;
-    const float t84 = 1.0f / s_bearing_speed;
-    const float t85 = t69 * t84;
-    const float t86 = t71 * t84;
-    const float t87 = t74 * t84;
-    const float t88 = t77 * t84;
-    const float t89 = t80 * t84;
-    const float t90 = t83 * t84;
-    const float nu_bearing_speed = y_bearing_speed - h_bearing_py_speed * t65 + t50 * t64;
-    const float t91 = nu_bearing_speed * (nu_bearing_speed * t84);
-    const float nis_speed = t66 + t91;
+    const float t69 = p_px_px_speed - t60 * t53;
+    const float t70 = p_px_py_speed - t60 * t54;
+    const float t71 = t70 * h_bearing_py_speed - t69 * t51;
+    const float t72 = p_py_py_speed - t61 * t54;
+    const float t73 = t72 * h_bearing_py_speed - t70 * t51;
+    const float t74 = p_px_v_speed - t60 * t55;
+    const float t75 = p_py_v_speed - t61 * t55;
+    const float t76 = t75 * h_bearing_py_speed - t74 * t51;
+    const float t77 = p_px_th_speed - t60 * t56;
+    const float t78 = p_py_th_speed - t61 * t56;
+    const float t79 = t78 * h_bearing_py_speed - t77 * t51;
+    const float t80 = p_px_a_speed - t60 * t57;
+    const float t81 = p_py_a_speed - t61 * t57;
+    const float t82 = t81 * h_bearing_py_speed - t80 * t51;
+    const float t83 = p_px_w_speed - t60 * t58;
+    const float t84 = p_py_w_speed - t61 * t58;
+    const float t85 = t84 * h_bearing_py_speed - t83 * t51;
+    const float s_bearing_speed = h_bearing_py_speed * t73 - t51 * t71 + 1.0e-6f;
+    const float t86 = 1.0f / s_bearing_speed;
+    const float t87 = t71 * t86;
+    const float t88 = t73 * t86;
+    const float t89 = t76 * t86;
+    const float t90 = t79 * t86;
+    const float t91 = t82 * t86;
+    const float t92 = t85 * t86;
+    const float nu_bearing_speed = y_bearing_speed - h_bearing_py_speed * t67 + t51 * t66;
+    const float t93 = nu_bearing_speed * (nu_bearing_speed * t86);
+    const float nis_speed = t68 + t93;
 
     /* speed: state and innovation squared */
-    const float t92 = 0.5f * (t66 + logf(s_range_speed) + 1.837877f + t91 + logf(s_bearing_speed)
+    const float t94 = 0.5f * (t68 + logf(s_range_speed) + 1.837877f + t93 + logf(s_bearing_speed)
         + 1.837877f);
-    const float l_speed = -t92;
-    const float px_next_speed = px_speed + t64 + t85 * nu_bearing_speed;
-    const float py_next_speed = py_speed + t65 + t86 * nu_bearing_speed;
-    const float v_next_speed = kf->modes.speed.x[MANEUVER_V] + t60 * y_range_speed
-        + t87 * nu_bearing_speed;
-    const float th_next_speed = kf->modes.speed.x[MANEUVER_TH] + t61 * y_range_speed
-        + t88 * nu_bearing_speed;
-    const float a_next_speed = kf->modes.speed.x[MANEUVER_A] + t62 * y_range_speed
+    const float l_speed = -t94;
+    const float px_next_speed = px_speed + t66 + t87 * nu_bearing_speed;
+    const float py_next_speed = py_speed + t67 + t88 * nu_bearing_speed;
+    const float v_next_speed = kf->modes.speed.x[MANEUVER_V] + t62 * y_range_speed
         + t89 * nu_bearing_speed;
-    const float w_next_speed = kf->modes.speed.x[MANEUVER_W] + t63 * y_range_speed
+    const float th_next_speed = kf->modes.speed.x[MANEUVER_TH] + t63 * y_range_speed
         + t90 * nu_bearing_speed;
-    const float t93 = maneuver_wrap(th_next_speed, 3.1415927f);
+    const float a_next_speed = kf->modes.speed.x[MANEUVER_A] + t64 * y_range_speed
+        + t91 * nu_bearing_speed;
+    const float w_next_speed = kf->modes.speed.x[MANEUVER_W] + t65 * y_range_speed
+        + t92 * nu_bearing_speed;
+    const float t95 = maneuver_wrap(th_next_speed, 3.1415927f);
 
     /* speed: guards */
-    if (!maneuver_finite(y_range_speed + y_bearing_speed + s_range_speed + s_bearing_speed)) {
+    if (!maneuver_finite(y_range_speed + t52 + s_range_speed + s_bearing_speed)) {
         return MANEUVER_NOT_FINITE;
     }
 
     /* turn: innovation */
     const float px_turn = kf->modes.turn.x[MANEUVER_PX];
     const float py_turn = kf->modes.turn.x[MANEUVER_PY];
-    const float t94 = px_turn * px_turn + py_turn * py_turn;
-    const float h_range_turn = sqrtf(t94);
-    const float t95 = h_range_turn > 0.0f ? 1.0f / h_range_turn : 0.0f;
-    const float h_range_px_turn = px_turn * t95;
-    const float h_range_py_turn = py_turn * t95;
+    const float t96 = px_turn * px_turn + py_turn * py_turn;
+    const float h_range_turn = sqrtf(t96);
+    const float t97 = h_range_turn > 0.0f ? 1.0f / h_range_turn : 0.0f;
+    const float h_range_px_turn = px_turn * t97;
+    const float h_range_py_turn = py_turn * t97;
     const float h_bearing_turn = atan2f(py_turn, px_turn);
-    const float t96 = t94 > 0.0f ? 1.0f / t94 : 0.0f;
-    const float t97 = py_turn * t96;
-    const float h_bearing_py_turn = px_turn * t96;
+    const float t98 = t96 > 0.0f ? 1.0f / t96 : 0.0f;
+    const float t99 = py_turn * t98;
+    const float h_bearing_py_turn = px_turn * t98;
     const float y_range_turn = z->range - h_range_turn;
-    const float y_bearing_turn = maneuver_wrap(z->bearing - h_bearing_turn, 3.1415927f);
+    const float t100 = z->bearing - h_bearing_turn;
+    const float y_bearing_turn = maneuver_wrap(t100, 3.1415927f);
 
     /* turn: gain and covariance: range */
     const float p_px_px_turn = kf->modes.turn.P[0];
     const float p_px_py_turn = kf->modes.turn.P[1];
-    const float t98 = p_px_px_turn * h_range_px_turn + p_px_py_turn * h_range_py_turn;
+    const float t101 = p_px_px_turn * h_range_px_turn + p_px_py_turn * h_range_py_turn;
     const float p_py_py_turn = kf->modes.turn.P[2];
-    const float t99 = p_px_py_turn * h_range_px_turn + p_py_py_turn * h_range_py_turn;
+    const float t102 = p_px_py_turn * h_range_px_turn + p_py_py_turn * h_range_py_turn;
     const float p_px_v_turn = kf->modes.turn.P[3];
     const float p_py_v_turn = kf->modes.turn.P[4];
-    const float t100 = p_px_v_turn * h_range_px_turn + p_py_v_turn * h_range_py_turn;
+    const float t103 = p_px_v_turn * h_range_px_turn + p_py_v_turn * h_range_py_turn;
     const float p_px_th_turn = kf->modes.turn.P[6];
     const float p_py_th_turn = kf->modes.turn.P[7];
-    const float t101 = p_px_th_turn * h_range_px_turn + p_py_th_turn * h_range_py_turn;
+    const float t104 = p_px_th_turn * h_range_px_turn + p_py_th_turn * h_range_py_turn;
     const float p_px_a_turn = kf->modes.turn.P[10];
     const float p_py_a_turn = kf->modes.turn.P[11];
-    const float t102 = p_px_a_turn * h_range_px_turn + p_py_a_turn * h_range_py_turn;
+    const float t105 = p_px_a_turn * h_range_px_turn + p_py_a_turn * h_range_py_turn;
     const float p_px_w_turn = kf->modes.turn.P[15];
     const float p_py_w_turn = kf->modes.turn.P[16];
-    const float t103 = p_px_w_turn * h_range_px_turn + p_py_w_turn * h_range_py_turn;
-    const float s_range_turn = h_range_px_turn * t98 + h_range_py_turn * t99 + 400.0f;
-    const float t104 = 1.0f / s_range_turn;
-    const float t105 = t98 * t104;
-    const float t106 = t99 * t104;
-    const float t107 = t100 * t104;
-    const float t108 = t101 * t104;
-    const float t109 = t102 * t104;
-    const float t110 = t103 * t104;
-    const float t111 = t105 * y_range_turn;
-    const float t112 = t106 * y_range_turn;
-    const float t113 = y_range_turn * (y_range_turn * t104);
+    const float t106 = p_px_w_turn * h_range_px_turn + p_py_w_turn * h_range_py_turn;
+    const float s_range_turn = h_range_px_turn * t101 + h_range_py_turn * t102 + 400.0f;
+    const float t107 = 1.0f / s_range_turn;
+    const float t108 = t101 * t107;
+    const float t109 = t102 * t107;
+    const float t110 = t103 * t107;
+    const float t111 = t104 * t107;
+    const float t112 = t105 * t107;
+    const float t113 = t106 * t107;
+    const float t114 = t108 * y_range_turn;
+    const float t115 = t109 * y_range_turn;
+    const float t116 = y_range_turn * (y_range_turn * t107);
 
     /* turn: gain and covariance: bearing */
-    const float t114 = p_px_px_turn - t105 * t98;
-    const float t115 = p_px_py_turn - t105 * t99;
-    const float t116 = t115 * h_bearing_py_turn - t114 * t97;
-    const float t117 = p_py_py_turn - t106 * t99;
-    const float t118 = t117 * h_bearing_py_turn - t115 * t97;
-    const float t119 = p_px_v_turn - t105 * t100;
-    const float t120 = p_py_v_turn - t106 * t100;
-    const float t121 = t120 * h_bearing_py_turn - t119 * t97;
-    const float t122 = p_px_th_turn - t105 * t101;
-    const float t123 = p_py_th_turn - t106 * t101;
-    const float t124 = t123 * h_bearing_py_turn - t122 * t97;
-    const float t125 = p_px_a_turn - t105 * t102;
-    const float t126 = p_py_a_turn - t106 * t102;
-    const float t127 = t126 * h_bearing_py_turn - t125 * t97;
-    const float t128 = p_px_w_turn - t105 * t103;
-    const float t129 = p_py_w_turn - t106 * t103;
-    const float t130 = t129 * h_bearing_py_turn - t128 * t97;
-    const float s_bearing_turn = h_bearing_py_turn * t118 - t97 * t116 + 1.0e-6f;
-    const float t131 = 1.0f / s_bearing_turn;
-    const float t132 = t116 * t131;
-    const float t133 = t118 * t131;
-    const float t134 = t121 * t131;
-    const float t135 = t124 * t131;
-    const float t136 = t127 * t131;
-    const float t137 = t130 * t131;
-    const float nu_bearing_turn = y_bearing_turn - h_bearing_py_turn * t112 + t97 * t111;
-    const float t138 = nu_bearing_turn * (nu_bearing_turn * t131);
-    const float nis_turn = t113 + t138;
+    const float t117 = p_px_px_turn - t108 * t101;
+    const float t118 = p_px_py_turn - t108 * t102;
+    const float t119 = t118 * h_bearing_py_turn - t117 * t99;
+    const float t120 = p_py_py_turn - t109 * t102;
+    const float t121 = t120 * h_bearing_py_turn - t118 * t99;
+    const float t122 = p_px_v_turn - t108 * t103;
+    const float t123 = p_py_v_turn - t109 * t103;
+    const float t124 = t123 * h_bearing_py_turn - t122 * t99;
+    const float t125 = p_px_th_turn - t108 * t104;
+    const float t126 = p_py_th_turn - t109 * t104;
+    const float t127 = t126 * h_bearing_py_turn - t125 * t99;
+    const float t128 = p_px_a_turn - t108 * t105;
+    const float t129 = p_py_a_turn - t109 * t105;
+    const float t130 = t129 * h_bearing_py_turn - t128 * t99;
+    const float t131 = p_px_w_turn - t108 * t106;
+    const float t132 = p_py_w_turn - t109 * t106;
+    const float t133 = t132 * h_bearing_py_turn - t131 * t99;
+    const float s_bearing_turn = h_bearing_py_turn * t121 - t99 * t119 + 1.0e-6f;
+    const float t134 = 1.0f / s_bearing_turn;
+    const float t135 = t119 * t134;
+    const float t136 = t121 * t134;
+    const float t137 = t124 * t134;
+    const float t138 = t127 * t134;
+    const float t139 = t130 * t134;
+    const float t140 = t133 * t134;
+    const float nu_bearing_turn = y_bearing_turn - h_bearing_py_turn * t115 + t99 * t114;
+    const float t141 = nu_bearing_turn * (nu_bearing_turn * t134);
+    const float nis_turn = t116 + t141;
 
     /* turn: state and innovation squared */
-    const float t139 = 0.5f * (t113 + logf(s_range_turn) + 1.837877f + t138 + logf(s_bearing_turn)
+    const float t142 = 0.5f * (t116 + logf(s_range_turn) + 1.837877f + t141 + logf(s_bearing_turn)
         + 1.837877f);
-    const float l_turn = -t139;
-    const float px_next_turn = px_turn + t111 + t132 * nu_bearing_turn;
-    const float py_next_turn = py_turn + t112 + t133 * nu_bearing_turn;
-    const float v_next_turn = kf->modes.turn.x[MANEUVER_V] + t107 * y_range_turn
-        + t134 * nu_bearing_turn;
-    const float th_next_turn = kf->modes.turn.x[MANEUVER_TH] + t108 * y_range_turn
-        + t135 * nu_bearing_turn;
-    const float a_next_turn = kf->modes.turn.x[MANEUVER_A] + t109 * y_range_turn
-        + t136 * nu_bearing_turn;
-    const float w_next_turn = kf->modes.turn.x[MANEUVER_W] + t110 * y_range_turn
+    const float l_turn = -t142;
+    const float px_next_turn = px_turn + t114 + t135 * nu_bearing_turn;
+    const float py_next_turn = py_turn + t115 + t136 * nu_bearing_turn;
+    const float v_next_turn = kf->modes.turn.x[MANEUVER_V] + t110 * y_range_turn
         + t137 * nu_bearing_turn;
-    const float t140 = maneuver_wrap(th_next_turn, 3.1415927f);
+    const float th_next_turn = kf->modes.turn.x[MANEUVER_TH] + t111 * y_range_turn
+        + t138 * nu_bearing_turn;
+    const float a_next_turn = kf->modes.turn.x[MANEUVER_A] + t112 * y_range_turn
+        + t139 * nu_bearing_turn;
+    const float w_next_turn = kf->modes.turn.x[MANEUVER_W] + t113 * y_range_turn
+        + t140 * nu_bearing_turn;
+    const float t143 = maneuver_wrap(th_next_turn, 3.1415927f);
 
     /* turn: guards */
-    if (!maneuver_finite(y_range_turn + y_bearing_turn + s_range_turn + s_bearing_turn)) {
+    if (!maneuver_finite(y_range_turn + t100 + s_range_turn + s_bearing_turn)) {
         return MANEUVER_NOT_FINITE;
     }
     if (!(s_range_cruise > 0.0f) || !(s_bearing_cruise > 0.0f)) { return MANEUVER_NOT_POSITIVE; }
@@ -1050,24 +1061,27 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     if (!(s_range_turn > 0.0f) || !(s_bearing_turn > 0.0f)) { return MANEUVER_NOT_POSITIVE; }
 
     /* gate */
-    const bool t141 = nis_cruise > 18.420681f && nis_speed > 18.420681f && nis_turn > 18.420681f;
-    const float t142 = maneuver_min(maneuver_min(nis_cruise, nis_speed), nis_turn);
-    if (t141 && kf->gate_count_radar < 3u) {
-        kf->nis = t142;
+    const bool t144 = nis_cruise > 18.420681f && nis_speed > 18.420681f && nis_turn > 18.420681f;
+    const float t145 = maneuver_min(maneuver_min(nis_cruise, nis_speed), nis_turn);
+    if (t144 && kf->gate_count_radar < 3u) {
+        kf->nis = t145;
+        kf->modes.cruise.nis = nis_cruise;
+        kf->modes.speed.nis = nis_speed;
+        kf->modes.turn.nis = nis_turn;
         kf->gate_count_radar = kf->gate_count_radar + 1u;
         return MANEUVER_GATED;
     }
-    if (t141) { flags |= MANEUVER_ANOMALY; }
-    if (!maneuver_finite(nis_cruise + px_next_cruise + py_next_cruise + v_next_cruise + t46
-        + a_next_cruise + w_next_cruise)) {
+    if (t144) { flags |= MANEUVER_ANOMALY; }
+    if (!maneuver_finite(nis_cruise + px_next_cruise + py_next_cruise + v_next_cruise
+        + th_next_cruise + a_next_cruise + w_next_cruise)) {
         return MANEUVER_NOT_FINITE;
     }
-    if (!maneuver_finite(nis_speed + px_next_speed + py_next_speed + v_next_speed + t93
+    if (!maneuver_finite(nis_speed + px_next_speed + py_next_speed + v_next_speed + th_next_speed
         + a_next_speed + w_next_speed)) {
         return MANEUVER_NOT_FINITE;
     }
-    if (!maneuver_finite(nis_turn + px_next_turn + py_next_turn + v_next_turn + t140 + a_next_turn
-        + w_next_turn)) {
+    if (!maneuver_finite(nis_turn + px_next_turn + py_next_turn + v_next_turn + th_next_turn
+        + a_next_turn + w_next_turn)) {
         return MANEUVER_NOT_FINITE;
     }
     const float mu_cruise = kf->mu[MANEUVER_MODE_CRUISE];
@@ -1075,46 +1089,46 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float mu_turn = kf->mu[MANEUVER_MODE_TURN];
 
     /* probabilities */
-    const bool t143 = mu_cruise > 0.0f;
-    const bool t144 = mu_speed > 0.0f;
-    const float t145 = t144 && (!t143 || l_cruise < l_speed) ? l_speed : l_cruise;
-    const bool t146 = mu_turn > 0.0f;
-    const float l_best = t146 && (!(t143 || t144) || t145 < l_turn) ? l_turn : t145;
+    const bool t146 = mu_cruise > 0.0f;
+    const bool t147 = mu_speed > 0.0f;
+    const float t148 = t147 && (!t146 || l_cruise < l_speed) ? l_speed : l_cruise;
+    const bool t149 = mu_turn > 0.0f;
+    const float l_best = t149 && (!(t146 || t147) || t148 < l_turn) ? l_turn : t148;
     if (!maneuver_finite(l_best)) { return MANEUVER_NOT_FINITE; }
-    const float t147 = t143 ? mu_cruise * expf(-(t45 + l_best)) : 0.0f;
-    const float t148 = t144 ? mu_speed * expf(-(t92 + l_best)) : 0.0f;
-    const float t149 = t146 ? mu_turn * expf(-(t139 + l_best)) : 0.0f;
-    const float mu_sum = t147 + t148 + t149;
+    const float t150 = t146 ? mu_cruise * expf(-(t46 + l_best)) : 0.0f;
+    const float t151 = t147 ? mu_speed * expf(-(t94 + l_best)) : 0.0f;
+    const float t152 = t149 ? mu_turn * expf(-(t142 + l_best)) : 0.0f;
+    const float mu_sum = t150 + t151 + t152;
     if (!maneuver_finite(mu_sum)) { return MANEUVER_NOT_FINITE; }
-    const float t150 = maneuver_max(t147 / mu_sum, 1.0e-9f);
-    const float t151 = maneuver_max(t148 / mu_sum, 1.0e-9f);
-    const float t152 = maneuver_max(t149 / mu_sum, 1.0e-9f);
-    const float t153 = 1.0f / (t150 + t151 + t152);
-    const float mu_cruise_next = t150 * t153;
-    const float mu_speed_next = t151 * t153;
-    const float mu_turn_next = t152 * t153;
+    const float t153 = maneuver_max(t150 / mu_sum, 1.0e-9f);
+    const float t154 = maneuver_max(t151 / mu_sum, 1.0e-9f);
+    const float t155 = maneuver_max(t152 / mu_sum, 1.0e-9f);
+    const float t156 = 1.0f / (t153 + t154 + t155);
+    const float mu_cruise_next = t153 * t156;
+    const float mu_speed_next = t154 * t156;
+    const float mu_turn_next = t155 * t156;
 
     /* combined state */
-    const bool t154 = mu_cruise_next < mu_speed_next;
-    const float th_base = (t154 ? mu_speed_next : mu_cruise_next) < mu_turn_next ? t140
-        : (t154 ? t93 : t46);
-    const float t155 = maneuver_wrap(t46 - th_base, 3.1415927f);
-    const float t156 = mu_speed_next * (1.0f / (mu_cruise_next + mu_speed_next));
-    const float t157 = t156 * (px_next_speed - px_next_cruise);
-    const float t158 = t156 * (py_next_speed - py_next_cruise);
-    const float t159 = t156 * (v_next_speed - v_next_cruise);
-    const float t160 = t155 + t156 * (maneuver_wrap(t93 - th_base, 3.1415927f) - t155);
-    const float t161 = t156 * (a_next_speed - a_next_cruise);
-    const float t162 = t156 * (w_next_speed - w_next_cruise);
-    const float px_all = px_next_cruise + t157
-        + mu_turn_next * (px_next_turn - px_next_cruise - t157);
-    const float py_all = py_next_cruise + t158
-        + mu_turn_next * (py_next_turn - py_next_cruise - t158);
-    const float v_all = v_next_cruise + t159 + mu_turn_next * (v_next_turn - v_next_cruise - t159);
-    const float th_all = th_base + t160
-        + mu_turn_next * (maneuver_wrap(t140 - th_base, 3.1415927f) - t160);
-    const float a_all = a_next_cruise + t161 + mu_turn_next * (a_next_turn - a_next_cruise - t161);
-    const float w_all = w_next_cruise + t162 + mu_turn_next * (w_next_turn - w_next_cruise - t162);
+    const bool t157 = mu_cruise_next < mu_speed_next;
+    const float th_base = (t157 ? mu_speed_next : mu_cruise_next) < mu_turn_next ? t143
+        : (t157 ? t95 : t47);
+    const float t158 = maneuver_wrap(t47 - th_base, 3.1415927f);
+    const float t159 = mu_speed_next * (1.0f / (mu_cruise_next + mu_speed_next));
+    const float t160 = t159 * (px_next_speed - px_next_cruise);
+    const float t161 = t159 * (py_next_speed - py_next_cruise);
+    const float t162 = t159 * (v_next_speed - v_next_cruise);
+    const float t163 = t158 + t159 * (maneuver_wrap(t95 - th_base, 3.1415927f) - t158);
+    const float t164 = t159 * (a_next_speed - a_next_cruise);
+    const float t165 = t159 * (w_next_speed - w_next_cruise);
+    const float px_all = px_next_cruise + t160
+        + mu_turn_next * (px_next_turn - px_next_cruise - t160);
+    const float py_all = py_next_cruise + t161
+        + mu_turn_next * (py_next_turn - py_next_cruise - t161);
+    const float v_all = v_next_cruise + t162 + mu_turn_next * (v_next_turn - v_next_cruise - t162);
+    const float th_all = th_base + t163
+        + mu_turn_next * (maneuver_wrap(t143 - th_base, 3.1415927f) - t163);
+    const float a_all = a_next_cruise + t164 + mu_turn_next * (a_next_turn - a_next_cruise - t164);
+    const float w_all = w_next_cruise + t165 + mu_turn_next * (w_next_turn - w_next_cruise - t165);
     if (!maneuver_finite(px_all + py_all + v_all + th_all + a_all + w_all + mu_cruise_next
         + mu_speed_next + mu_turn_next)) {
         return MANEUVER_NOT_FINITE;
@@ -1124,180 +1138,180 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->modes.cruise.x[MANEUVER_PX] = px_next_cruise;
     kf->modes.cruise.x[MANEUVER_PY] = py_next_cruise;
     kf->modes.cruise.x[MANEUVER_V] = v_next_cruise;
-    kf->modes.cruise.x[MANEUVER_TH] = t46;
+    kf->modes.cruise.x[MANEUVER_TH] = t47;
     kf->modes.cruise.x[MANEUVER_A] = a_next_cruise;
     kf->modes.cruise.x[MANEUVER_W] = w_next_cruise;
-    const float p_px_px_next_cruise = t20 - t38 * t22;
+    const float p_px_px_next_cruise = t21 - t39 * t23;
     kf->modes.cruise.P[0] = p_px_px_next_cruise;
-    const float p_px_py_next_cruise = t21 - t38 * t24;
+    const float p_px_py_next_cruise = t22 - t39 * t25;
     kf->modes.cruise.P[1] = p_px_py_next_cruise;
-    const float p_py_py_next_cruise = t23 - t39 * t24;
+    const float p_py_py_next_cruise = t24 - t40 * t25;
     kf->modes.cruise.P[2] = p_py_py_next_cruise;
-    const float p_px_v_next_cruise = t25 - t38 * t27;
+    const float p_px_v_next_cruise = t26 - t39 * t28;
     kf->modes.cruise.P[3] = p_px_v_next_cruise;
-    const float p_py_v_next_cruise = t26 - t39 * t27;
+    const float p_py_v_next_cruise = t27 - t40 * t28;
     kf->modes.cruise.P[4] = p_py_v_next_cruise;
     const float p_v_v_cruise = kf->modes.cruise.P[5];
-    const float p_v_v_next_cruise = p_v_v_cruise - t13 * t6 - t40 * t27;
+    const float p_v_v_next_cruise = p_v_v_cruise - t14 * t7 - t41 * t28;
     kf->modes.cruise.P[5] = p_v_v_next_cruise;
-    const float p_px_th_next_cruise = t28 - t38 * t30;
+    const float p_px_th_next_cruise = t29 - t39 * t31;
     kf->modes.cruise.P[6] = p_px_th_next_cruise;
-    const float p_py_th_next_cruise = t29 - t39 * t30;
+    const float p_py_th_next_cruise = t30 - t40 * t31;
     kf->modes.cruise.P[7] = p_py_th_next_cruise;
     const float p_v_th_cruise = kf->modes.cruise.P[8];
-    const float p_v_th_next_cruise = p_v_th_cruise - t13 * t7 - t40 * t30;
+    const float p_v_th_next_cruise = p_v_th_cruise - t14 * t8 - t41 * t31;
     kf->modes.cruise.P[8] = p_v_th_next_cruise;
     const float p_th_th_cruise = kf->modes.cruise.P[9];
-    const float p_th_th_next_cruise = p_th_th_cruise - t14 * t7 - t41 * t30;
+    const float p_th_th_next_cruise = p_th_th_cruise - t15 * t8 - t42 * t31;
     kf->modes.cruise.P[9] = p_th_th_next_cruise;
-    const float p_px_a_next_cruise = t31 - t38 * t33;
+    const float p_px_a_next_cruise = t32 - t39 * t34;
     kf->modes.cruise.P[10] = p_px_a_next_cruise;
-    const float p_py_a_next_cruise = t32 - t39 * t33;
+    const float p_py_a_next_cruise = t33 - t40 * t34;
     kf->modes.cruise.P[11] = p_py_a_next_cruise;
     const float p_v_a_cruise = kf->modes.cruise.P[12];
-    const float p_v_a_next_cruise = p_v_a_cruise - t13 * t8 - t40 * t33;
+    const float p_v_a_next_cruise = p_v_a_cruise - t14 * t9 - t41 * t34;
     kf->modes.cruise.P[12] = p_v_a_next_cruise;
     const float p_th_a_cruise = kf->modes.cruise.P[13];
-    const float p_th_a_next_cruise = p_th_a_cruise - t14 * t8 - t41 * t33;
+    const float p_th_a_next_cruise = p_th_a_cruise - t15 * t9 - t42 * t34;
     kf->modes.cruise.P[13] = p_th_a_next_cruise;
     const float p_a_a_cruise = kf->modes.cruise.P[14];
-    const float p_a_a_next_cruise = p_a_a_cruise - t15 * t8 - t42 * t33;
+    const float p_a_a_next_cruise = p_a_a_cruise - t16 * t9 - t43 * t34;
     kf->modes.cruise.P[14] = p_a_a_next_cruise;
-    const float p_px_w_next_cruise = t34 - t38 * t36;
+    const float p_px_w_next_cruise = t35 - t39 * t37;
     kf->modes.cruise.P[15] = p_px_w_next_cruise;
-    const float p_py_w_next_cruise = t35 - t39 * t36;
+    const float p_py_w_next_cruise = t36 - t40 * t37;
     kf->modes.cruise.P[16] = p_py_w_next_cruise;
     const float p_v_w_cruise = kf->modes.cruise.P[17];
-    const float p_v_w_next_cruise = p_v_w_cruise - t13 * t9 - t40 * t36;
+    const float p_v_w_next_cruise = p_v_w_cruise - t14 * t10 - t41 * t37;
     kf->modes.cruise.P[17] = p_v_w_next_cruise;
     const float p_th_w_cruise = kf->modes.cruise.P[18];
-    const float p_th_w_next_cruise = p_th_w_cruise - t14 * t9 - t41 * t36;
+    const float p_th_w_next_cruise = p_th_w_cruise - t15 * t10 - t42 * t37;
     kf->modes.cruise.P[18] = p_th_w_next_cruise;
     const float p_a_w_cruise = kf->modes.cruise.P[19];
-    const float p_a_w_next_cruise = p_a_w_cruise - t15 * t9 - t42 * t36;
+    const float p_a_w_next_cruise = p_a_w_cruise - t16 * t10 - t43 * t37;
     kf->modes.cruise.P[19] = p_a_w_next_cruise;
     const float p_w_w_cruise = kf->modes.cruise.P[20];
-    const float p_w_w_next_cruise = p_w_w_cruise - t16 * t9 - t43 * t36;
+    const float p_w_w_next_cruise = p_w_w_cruise - t17 * t10 - t44 * t37;
     kf->modes.cruise.P[20] = p_w_w_next_cruise;
 
     /* speed: store */
     kf->modes.speed.x[MANEUVER_PX] = px_next_speed;
     kf->modes.speed.x[MANEUVER_PY] = py_next_speed;
     kf->modes.speed.x[MANEUVER_V] = v_next_speed;
-    kf->modes.speed.x[MANEUVER_TH] = t93;
+    kf->modes.speed.x[MANEUVER_TH] = t95;
     kf->modes.speed.x[MANEUVER_A] = a_next_speed;
     kf->modes.speed.x[MANEUVER_W] = w_next_speed;
-    const float p_px_px_next_speed = t67 - t85 * t69;
+    const float p_px_px_next_speed = t69 - t87 * t71;
     kf->modes.speed.P[0] = p_px_px_next_speed;
-    const float p_px_py_next_speed = t68 - t85 * t71;
+    const float p_px_py_next_speed = t70 - t87 * t73;
     kf->modes.speed.P[1] = p_px_py_next_speed;
-    const float p_py_py_next_speed = t70 - t86 * t71;
+    const float p_py_py_next_speed = t72 - t88 * t73;
     kf->modes.speed.P[2] = p_py_py_next_speed;
-    const float p_px_v_next_speed = t72 - t85 * t74;
+    const float p_px_v_next_speed = t74 - t87 * t76;
     kf->modes.speed.P[3] = p_px_v_next_speed;
-    const float p_py_v_next_speed = t73 - t86 * t74;
+    const float p_py_v_next_speed = t75 - t88 * t76;
     kf->modes.speed.P[4] = p_py_v_next_speed;
     const float p_v_v_speed = kf->modes.speed.P[5];
-    const float p_v_v_next_speed = p_v_v_speed - t60 * t53 - t87 * t74;
+    const float p_v_v_next_speed = p_v_v_speed - t62 * t55 - t89 * t76;
     kf->modes.speed.P[5] = p_v_v_next_speed;
-    const float p_px_th_next_speed = t75 - t85 * t77;
+    const float p_px_th_next_speed = t77 - t87 * t79;
     kf->modes.speed.P[6] = p_px_th_next_speed;
-    const float p_py_th_next_speed = t76 - t86 * t77;
+    const float p_py_th_next_speed = t78 - t88 * t79;
     kf->modes.speed.P[7] = p_py_th_next_speed;
     const float p_v_th_speed = kf->modes.speed.P[8];
-    const float p_v_th_next_speed = p_v_th_speed - t60 * t54 - t87 * t77;
+    const float p_v_th_next_speed = p_v_th_speed - t62 * t56 - t89 * t79;
     kf->modes.speed.P[8] = p_v_th_next_speed;
     const float p_th_th_speed = kf->modes.speed.P[9];
-    const float p_th_th_next_speed = p_th_th_speed - t61 * t54 - t88 * t77;
+    const float p_th_th_next_speed = p_th_th_speed - t63 * t56 - t90 * t79;
     kf->modes.speed.P[9] = p_th_th_next_speed;
-    const float p_px_a_next_speed = t78 - t85 * t80;
+    const float p_px_a_next_speed = t80 - t87 * t82;
     kf->modes.speed.P[10] = p_px_a_next_speed;
-    const float p_py_a_next_speed = t79 - t86 * t80;
+    const float p_py_a_next_speed = t81 - t88 * t82;
     kf->modes.speed.P[11] = p_py_a_next_speed;
     const float p_v_a_speed = kf->modes.speed.P[12];
-    const float p_v_a_next_speed = p_v_a_speed - t60 * t55 - t87 * t80;
+    const float p_v_a_next_speed = p_v_a_speed - t62 * t57 - t89 * t82;
     kf->modes.speed.P[12] = p_v_a_next_speed;
     const float p_th_a_speed = kf->modes.speed.P[13];
-    const float p_th_a_next_speed = p_th_a_speed - t61 * t55 - t88 * t80;
+    const float p_th_a_next_speed = p_th_a_speed - t63 * t57 - t90 * t82;
     kf->modes.speed.P[13] = p_th_a_next_speed;
     const float p_a_a_speed = kf->modes.speed.P[14];
-    const float p_a_a_next_speed = p_a_a_speed - t62 * t55 - t89 * t80;
+    const float p_a_a_next_speed = p_a_a_speed - t64 * t57 - t91 * t82;
     kf->modes.speed.P[14] = p_a_a_next_speed;
-    const float p_px_w_next_speed = t81 - t85 * t83;
+    const float p_px_w_next_speed = t83 - t87 * t85;
     kf->modes.speed.P[15] = p_px_w_next_speed;
-    const float p_py_w_next_speed = t82 - t86 * t83;
+    const float p_py_w_next_speed = t84 - t88 * t85;
     kf->modes.speed.P[16] = p_py_w_next_speed;
     const float p_v_w_speed = kf->modes.speed.P[17];
-    const float p_v_w_next_speed = p_v_w_speed - t60 * t56 - t87 * t83;
+    const float p_v_w_next_speed = p_v_w_speed - t62 * t58 - t89 * t85;
     kf->modes.speed.P[17] = p_v_w_next_speed;
     const float p_th_w_speed = kf->modes.speed.P[18];
-    const float p_th_w_next_speed = p_th_w_speed - t61 * t56 - t88 * t83;
+    const float p_th_w_next_speed = p_th_w_speed - t63 * t58 - t90 * t85;
     kf->modes.speed.P[18] = p_th_w_next_speed;
     const float p_a_w_speed = kf->modes.speed.P[19];
-    const float p_a_w_next_speed = p_a_w_speed - t62 * t56 - t89 * t83;
+    const float p_a_w_next_speed = p_a_w_speed - t64 * t58 - t91 * t85;
     kf->modes.speed.P[19] = p_a_w_next_speed;
     const float p_w_w_speed = kf->modes.speed.P[20];
-    const float p_w_w_next_speed = p_w_w_speed - t63 * t56 - t90 * t83;
+    const float p_w_w_next_speed = p_w_w_speed - t65 * t58 - t92 * t85;
     kf->modes.speed.P[20] = p_w_w_next_speed;
 
     /* turn: store */
     kf->modes.turn.x[MANEUVER_PX] = px_next_turn;
     kf->modes.turn.x[MANEUVER_PY] = py_next_turn;
     kf->modes.turn.x[MANEUVER_V] = v_next_turn;
-    kf->modes.turn.x[MANEUVER_TH] = t140;
+    kf->modes.turn.x[MANEUVER_TH] = t143;
     kf->modes.turn.x[MANEUVER_A] = a_next_turn;
     kf->modes.turn.x[MANEUVER_W] = w_next_turn;
-    const float p_px_px_next_turn = t114 - t132 * t116;
+    const float p_px_px_next_turn = t117 - t135 * t119;
     kf->modes.turn.P[0] = p_px_px_next_turn;
-    const float p_px_py_next_turn = t115 - t132 * t118;
+    const float p_px_py_next_turn = t118 - t135 * t121;
     kf->modes.turn.P[1] = p_px_py_next_turn;
-    const float p_py_py_next_turn = t117 - t133 * t118;
+    const float p_py_py_next_turn = t120 - t136 * t121;
     kf->modes.turn.P[2] = p_py_py_next_turn;
-    const float p_px_v_next_turn = t119 - t132 * t121;
+    const float p_px_v_next_turn = t122 - t135 * t124;
     kf->modes.turn.P[3] = p_px_v_next_turn;
-    const float p_py_v_next_turn = t120 - t133 * t121;
+    const float p_py_v_next_turn = t123 - t136 * t124;
     kf->modes.turn.P[4] = p_py_v_next_turn;
     const float p_v_v_turn = kf->modes.turn.P[5];
-    const float p_v_v_next_turn = p_v_v_turn - t107 * t100 - t134 * t121;
+    const float p_v_v_next_turn = p_v_v_turn - t110 * t103 - t137 * t124;
     kf->modes.turn.P[5] = p_v_v_next_turn;
-    const float p_px_th_next_turn = t122 - t132 * t124;
+    const float p_px_th_next_turn = t125 - t135 * t127;
     kf->modes.turn.P[6] = p_px_th_next_turn;
-    const float p_py_th_next_turn = t123 - t133 * t124;
+    const float p_py_th_next_turn = t126 - t136 * t127;
     kf->modes.turn.P[7] = p_py_th_next_turn;
     const float p_v_th_turn = kf->modes.turn.P[8];
-    const float p_v_th_next_turn = p_v_th_turn - t107 * t101 - t134 * t124;
+    const float p_v_th_next_turn = p_v_th_turn - t110 * t104 - t137 * t127;
     kf->modes.turn.P[8] = p_v_th_next_turn;
     const float p_th_th_turn = kf->modes.turn.P[9];
-    const float p_th_th_next_turn = p_th_th_turn - t108 * t101 - t135 * t124;
+    const float p_th_th_next_turn = p_th_th_turn - t111 * t104 - t138 * t127;
     kf->modes.turn.P[9] = p_th_th_next_turn;
-    const float p_px_a_next_turn = t125 - t132 * t127;
+    const float p_px_a_next_turn = t128 - t135 * t130;
     kf->modes.turn.P[10] = p_px_a_next_turn;
-    const float p_py_a_next_turn = t126 - t133 * t127;
+    const float p_py_a_next_turn = t129 - t136 * t130;
     kf->modes.turn.P[11] = p_py_a_next_turn;
     const float p_v_a_turn = kf->modes.turn.P[12];
-    const float p_v_a_next_turn = p_v_a_turn - t107 * t102 - t134 * t127;
+    const float p_v_a_next_turn = p_v_a_turn - t110 * t105 - t137 * t130;
     kf->modes.turn.P[12] = p_v_a_next_turn;
     const float p_th_a_turn = kf->modes.turn.P[13];
-    const float p_th_a_next_turn = p_th_a_turn - t108 * t102 - t135 * t127;
+    const float p_th_a_next_turn = p_th_a_turn - t111 * t105 - t138 * t130;
     kf->modes.turn.P[13] = p_th_a_next_turn;
     const float p_a_a_turn = kf->modes.turn.P[14];
-    const float p_a_a_next_turn = p_a_a_turn - t109 * t102 - t136 * t127;
+    const float p_a_a_next_turn = p_a_a_turn - t112 * t105 - t139 * t130;
     kf->modes.turn.P[14] = p_a_a_next_turn;
-    const float p_px_w_next_turn = t128 - t132 * t130;
+    const float p_px_w_next_turn = t131 - t135 * t133;
     kf->modes.turn.P[15] = p_px_w_next_turn;
-    const float p_py_w_next_turn = t129 - t133 * t130;
+    const float p_py_w_next_turn = t132 - t136 * t133;
     kf->modes.turn.P[16] = p_py_w_next_turn;
     const float p_v_w_turn = kf->modes.turn.P[17];
-    const float p_v_w_next_turn = p_v_w_turn - t107 * t103 - t134 * t130;
+    const float p_v_w_next_turn = p_v_w_turn - t110 * t106 - t137 * t133;
     kf->modes.turn.P[17] = p_v_w_next_turn;
     const float p_th_w_turn = kf->modes.turn.P[18];
-    const float p_th_w_next_turn = p_th_w_turn - t108 * t103 - t135 * t130;
+    const float p_th_w_next_turn = p_th_w_turn - t111 * t106 - t138 * t133;
     kf->modes.turn.P[18] = p_th_w_next_turn;
     const float p_a_w_turn = kf->modes.turn.P[19];
-    const float p_a_w_next_turn = p_a_w_turn - t109 * t103 - t136 * t130;
+    const float p_a_w_next_turn = p_a_w_turn - t112 * t106 - t139 * t133;
     kf->modes.turn.P[19] = p_a_w_next_turn;
     const float p_w_w_turn = kf->modes.turn.P[20];
-    const float p_w_w_next_turn = p_w_w_turn - t110 * t103 - t137 * t130;
+    const float p_w_w_next_turn = p_w_w_turn - t113 * t106 - t140 * t133;
     kf->modes.turn.P[20] = p_w_w_next_turn;
 
     /* store: the bank */
@@ -1311,7 +1325,10 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->x[MANEUVER_A] = a_all;
     kf->x[MANEUVER_W] = w_all;
     kf->gate_count_radar = 0;
-    kf->nis = t142;
+    kf->modes.cruise.nis = nis_cruise;
+    kf->modes.speed.nis = nis_speed;
+    kf->modes.turn.nis = nis_turn;
+    kf->nis = t145;
     return flags;
 }
 
@@ -1372,7 +1389,7 @@ maneuver_status_t maneuver_set_covariance(maneuver_t *kf, const maneuver_real_t 
     for (int j = 6 - 1; j >= 0; j--) {
         const float round_off_cruise = 7.1525574e-7f * p_cruise[j * (j + 1) / 2 + j];
         const float pivot_cruise = w_cruise[j * (j + 1) / 2 + j];
-        if (pivot_cruise < -round_off_cruise) { return MANEUVER_NOT_POSITIVE; }
+        if (!(-round_off_cruise <= pivot_cruise)) { return MANEUVER_NOT_POSITIVE; }
         const float d_cruise = round_off_cruise < pivot_cruise ? pivot_cruise : 0.0f;
         w_cruise[j * (j + 1) / 2 + j] = d_cruise;
         for (int i = j - 1; i >= 0; i--) {
@@ -1493,4 +1510,4 @@ void maneuver_get_covariance(const maneuver_t *kf, maneuver_real_t P[36])
         }
     }
 }
-/* kfgen: body 9cdcb8a75d0542cac42480fde379c21d */
+/* kfgen: body 3712e7453448b4658c888aefd844faac */

@@ -3,14 +3,19 @@
 
 #include <math.h>
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "pendulum tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "pendulum tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool pendulum_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 /* a in (-half, half], by whole turns of 2 half */
@@ -222,15 +227,14 @@ pendulum_status_t pendulum_predict(pendulum_t *kf)
     const float s_rate_angle_next = u_rate_angle * s_angle_angle_next;
     const float angle_next = angle_centre + mean_angle;
     const float rate_next = rate_centre + mean_rate;
-    const float t15 = pendulum_wrap(angle_next, 3.1415927f);
 
     /* guards */
-    if (!pendulum_finite(t15 + rate_next + s_rate_rate_next + s_angle_angle_next)) {
+    if (!pendulum_finite(angle_next + rate_next + s_rate_rate_next + s_angle_angle_next)) {
         return PENDULUM_NOT_FINITE;
     }
 
     /* store */
-    kf->x[PENDULUM_ANGLE] = t15;
+    kf->x[PENDULUM_ANGLE] = pendulum_wrap(angle_next, 3.1415927f);
     kf->x[PENDULUM_RATE] = rate_next;
     kf->S[0] = s_angle_angle_next;
     kf->S[1] = s_rate_angle_next;
@@ -350,13 +354,12 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
     /* state */
     const float rate_next = kf->x[PENDULUM_RATE] + seen[7] * t8 + t7 * t9;
     const float angle_next = angle + seen[5] * t8 + t6 * t9;
-    const float t57 = pendulum_wrap(angle_next, 3.1415927f);
 
     /* guards */
-    if (!pendulum_finite(nis + t57 + rate_next)) { return PENDULUM_NOT_FINITE; }
+    if (!pendulum_finite(nis + angle_next + rate_next)) { return PENDULUM_NOT_FINITE; }
 
     /* store */
-    kf->x[PENDULUM_ANGLE] = t57;
+    kf->x[PENDULUM_ANGLE] = pendulum_wrap(angle_next, 3.1415927f);
     kf->x[PENDULUM_RATE] = rate_next;
     kf->S[0] = s_angle_angle_next;
     kf->S[1] = s_rate_angle_next;
@@ -396,7 +399,7 @@ pendulum_status_t pendulum_set_covariance(pendulum_t *kf, const pendulum_real_t 
     for (int j = 2 - 1; j >= 0; j--) {
         const float round_off = 2.3841858e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return PENDULUM_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return PENDULUM_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -445,9 +448,11 @@ pendulum_status_t pendulum_set_sqrt_covariance(pendulum_t *kf, const pendulum_re
 {
     if (kf == NULL || S == NULL) { return PENDULUM_NULL_ARGUMENT; }
     for (int i = 0; i < 2; i++) {
+        float variance = 0.0f;
         for (int j = 0; j < i + 1; j++) {
-            if (!pendulum_finite(S[2 * i + j])) { return PENDULUM_NOT_FINITE; }
+            variance = variance + S[2 * i + j] * S[2 * i + j];
         }
+        if (!pendulum_finite(variance)) { return PENDULUM_NOT_FINITE; }
     }
 
     /* columns may change their sign: the diagonal is kept positive */
@@ -472,4 +477,4 @@ void pendulum_get_sqrt_covariance(const pendulum_t *kf, pendulum_real_t S[4])
         }
     }
 }
-/* kfgen: body add79410bca98f2e1ab537e3020c6c33 */
+/* kfgen: body 2c0c421374dcf23af6392fcb5675fae4 */

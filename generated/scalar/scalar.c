@@ -1,14 +1,19 @@
 /* kfgen build scalar.yaml */
 #include "scalar.h"
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "scalar tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "scalar tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool scalar_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 scalar_status_t scalar_init(scalar_t *kf)
@@ -55,7 +60,7 @@ scalar_status_t scalar_update_gauge(scalar_t *kf, const scalar_gauge_t *z)
     const float level_next = level + d_level * t0 * y_height;
 
     /* guards */
-    if (!scalar_finite(level_next + nis)) { return SCALAR_NOT_FINITE; }
+    if (!scalar_finite(level_next + nis + s_height)) { return SCALAR_NOT_FINITE; }
     if (!(s_height > 0.0f)) { return SCALAR_NOT_POSITIVE; }
 
     /* store */
@@ -93,7 +98,7 @@ scalar_status_t scalar_set_covariance(scalar_t *kf, const scalar_real_t P[1])
     for (int j = 1 - 1; j >= 0; j--) {
         const float round_off = 1.1920929e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return SCALAR_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return SCALAR_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -128,4 +133,4 @@ void scalar_get_covariance(const scalar_t *kf, scalar_real_t P[1])
         }
     }
 }
-/* kfgen: body 9056922a20c6641f66d3abf45ec8267f */
+/* kfgen: body 36c1bfde25f35759e05cb77905ad3d9d */

@@ -10,7 +10,7 @@
  *
  * RAM 12 bytes a filter. Operations:
  *   predict       1 add
- *   update_gauge  6 mul, 4 add, 1 div, 1 compare
+ *   update_gauge  6 mul, 5 add, 1 div, 1 compare
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * 874cff36329667e7da8641f717958ac851b7240fcc7c2b52349f193c6346f64c
@@ -89,7 +89,7 @@ scalar_status_t scalar_predict(scalar_t *kf);
  * @param z   height [m]
  * @return SCALAR_OK, or an error that leaves *kf as it was
  *
- * 6 mul, 4 add, 1 div, 1 compare.
+ * 6 mul, 5 add, 1 div, 1 compare.
  */
 scalar_status_t scalar_update_gauge(scalar_t *kf, const scalar_gauge_t *z);
 
@@ -124,4 +124,4 @@ void scalar_get_covariance(const scalar_t *kf, scalar_real_t P[1]);
 #endif
 
 #endif
-/* kfgen: body 68a88c06ab81399942e297ce550dcb19 */
+/* kfgen: body 165f8656fd3fff22a49bc7e028757166 */

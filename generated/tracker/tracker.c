@@ -3,8 +3,10 @@
 
 #include <math.h>
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "tracker tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "tracker tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
 /* constants: in flash on AVR too, where what is only const takes RAM */
@@ -22,10 +24,13 @@ static const uint8_t tracker_order[4] TRACKER_flash = {
     0, 2, 1, 3
 };
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool tracker_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 tracker_status_t tracker_init(tracker_t *kf)
@@ -263,6 +268,8 @@ tracker_status_t tracker_update_fix(tracker_t *kf, const tracker_fix_t *z)
     const float u_py_vy_next = t39 - t52 * t49;
     const float u_vx_vy_next = t40 - t52 * t50;
     const float u_px_vy_next = t41 - t52 * t51;
+    const float t56 = 0.5f * (weighed_x * (weighed_x * t36) + logf(s_x_1) + 1.837877f
+        + weighed_y * (weighed_y * t54) + logf(s_y_1) + 1.837877f);
     const float px_next = px + (t33 + t37 * t41) * weighed_x
         + (t51 + t55 * u_px_vy_next) * weighed_y;
     const float vx_next = kf->x[TRACKER_VX] + (t32 + t37 * t40) * weighed_x
@@ -271,7 +278,7 @@ tracker_status_t tracker_update_fix(tracker_t *kf, const tracker_fix_t *z)
     const float vy_next = kf->x[TRACKER_VY] + t37 * weighed_x + t55 * weighed_y;
 
     /* guards */
-    if (!tracker_finite(nis + px_next + py_next + vx_next + vy_next + s_x_1 + s_y_1)) {
+    if (!tracker_finite(nis + px_next + py_next + vx_next + vy_next + s_x_1 + s_y_1 - t56)) {
         return TRACKER_NOT_FINITE;
     }
     if (!(s_x_1 > 0.0f) || !(s_y_1 > 0.0f)) { return TRACKER_NOT_POSITIVE; }
@@ -292,8 +299,7 @@ tracker_status_t tracker_update_fix(tracker_t *kf, const tracker_fix_t *z)
     kf->D[2] = d_py_next;
     kf->D[3] = d_vy_next;
     kf->nis = nis;
-    kf->log_likelihood = -(0.5f * (weighed_x * (weighed_x * t36) + logf(s_x_1) + 1.837877f
-        + weighed_y * (weighed_y * t54) + logf(s_y_1) + 1.837877f));
+    kf->log_likelihood = -t56;
     return flags;
 }
 
@@ -452,6 +458,8 @@ tracker_status_t tracker_update_fix_masked(tracker_t *kf, const tracker_fix_t *z
     const float u_py_vy_next = t52 - t68 * t65;
     const float u_vx_vy_next = t53 - t68 * t66;
     const float u_px_vy_next = t54 - t68 * t67;
+    const float t72 = 0.5f * ((t0 ? weighed_x * (weighed_x * t49) + logf(s_x_1) + 1.837877f : 0.0f)
+        + (t1 ? weighed_y * (weighed_y * t70) + logf(s_y_1) + 1.837877f : 0.0f));
     const float px_next = px + (t46 + t50 * t54) * weighed_x
         + (t67 + t71 * u_px_vy_next) * weighed_y;
     const float vx_next = kf->x[TRACKER_VX] + (t45 + t50 * t53) * weighed_x
@@ -460,7 +468,7 @@ tracker_status_t tracker_update_fix_masked(tracker_t *kf, const tracker_fix_t *z
     const float vy_next = kf->x[TRACKER_VY] + t50 * weighed_x + t71 * weighed_y;
 
     /* guards */
-    if (!tracker_finite(nis + px_next + py_next + vx_next + vy_next + s_x_1 + s_y_1)) {
+    if (!tracker_finite(nis + px_next + py_next + vx_next + vy_next + s_x_1 + s_y_1 - t72)) {
         return TRACKER_NOT_FINITE;
     }
     if (!(s_x_1 > 0.0f) || !(s_y_1 > 0.0f)) { return TRACKER_NOT_POSITIVE; }
@@ -481,8 +489,7 @@ tracker_status_t tracker_update_fix_masked(tracker_t *kf, const tracker_fix_t *z
     kf->D[2] = d_py_next;
     kf->D[3] = d_vy_next;
     kf->nis = nis;
-    kf->log_likelihood = -(0.5f * ((t0 ? weighed_x * (weighed_x * t49) + logf(s_x_1) + 1.837877f
-        : 0.0f) + (t1 ? weighed_y * (weighed_y * t70) + logf(s_y_1) + 1.837877f : 0.0f)));
+    kf->log_likelihood = -t72;
     return flags;
 }
 
@@ -522,7 +529,7 @@ tracker_status_t tracker_set_covariance(tracker_t *kf, const tracker_real_t P[16
     for (int j = 4 - 1; j >= 0; j--) {
         const float round_off = 4.7683716e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return TRACKER_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return TRACKER_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -567,4 +574,4 @@ void tracker_get_covariance(const tracker_t *kf, tracker_real_t P[16])
         }
     }
 }
-/* kfgen: body 7f4bc8b94631d1d9dcf8bf9342a67ba7 */
+/* kfgen: body cf6ebe29d0f14c079593f97d29c01b25 */

@@ -3,8 +3,10 @@
 
 #include <math.h>
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "vehicle tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "vehicle tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
 /* constants: in flash on AVR too, where what is only const takes RAM */
@@ -22,10 +24,13 @@ static const uint8_t vehicle_order[5] VEHICLE_flash = {
     0, 1, 2, 4, 3
 };
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool vehicle_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 /* a in (-half, half], by whole turns of 2 half */
@@ -203,18 +208,17 @@ vehicle_status_t vehicle_predict(vehicle_t *kf, const vehicle_inputs_t *u, vehic
     const float d_x = kf->D[0];
     const float d_x_next = d_x + t72 * (t40 * t63 * t72) + t74 * (t46 * t67 * t74)
         + t75 * (t51 * t70 * t75);
-    const float t76 = vehicle_wrap(heading_next, 3.1415927f);
 
     /* guards */
-    if (!vehicle_finite(x_next + y_next + t76 + speed_next + d_x_next + d_y_next + d_heading_next
-        + d_gyro_bias_next + d_speed_next)) {
+    if (!vehicle_finite(x_next + y_next + heading_next + speed_next + d_x_next + d_y_next
+        + d_heading_next + d_gyro_bias_next + d_speed_next)) {
         return VEHICLE_NOT_FINITE;
     }
 
     /* store */
     kf->x[VEHICLE_X] = x_next;
     kf->x[VEHICLE_Y] = y_next;
-    kf->x[VEHICLE_HEADING] = t76;
+    kf->x[VEHICLE_HEADING] = vehicle_wrap(heading_next, 3.1415927f);
     kf->x[VEHICLE_SPEED] = speed_next;
     kf->U[0] = u_x_y_next;
     kf->U[1] = u_x_heading_next;
@@ -238,6 +242,9 @@ vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z)
 {
     if (kf == NULL || z == NULL) { return VEHICLE_NULL_ARGUMENT; }
     vehicle_status_t flags = VEHICLE_OK;
+
+    /* arguments */
+    if (!vehicle_finite(kf->parameters.gnss_std)) { return VEHICLE_NOT_FINITE; }
 
     /* the first measurement sets the state */
     if (!vehicle_finite(z->x + z->y)) { return VEHICLE_NOT_FINITE; }
@@ -370,28 +377,27 @@ vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z)
     const float gyro_bias_next = kf->x[VEHICLE_GYRO_BIAS] + (t38 + t58 * t66) * y_x
         + (t45 + t65 * u_gyro_bias_speed_next) * nu_y;
     const float speed_next = kf->x[VEHICLE_SPEED] + t58 * y_x + t65 * nu_y;
-    const float t70 = vehicle_wrap(heading_next, 3.1415927f);
 
     /* guards */
     if (!vehicle_finite(y_x + y_y + s_x + s_y)) { return VEHICLE_NOT_FINITE; }
     if (s_x < 0.0f || s_y < 0.0f) { return VEHICLE_NOT_POSITIVE; }
 
     /* gate */
-    const bool t71 = nis > 13.815511f;
-    if (t71 && kf->gate_count_gnss < 10u) {
+    const bool t70 = nis > 13.815511f;
+    if (t70 && kf->gate_count_gnss < 10u) {
         kf->nis = nis;
         kf->gate_count_gnss = kf->gate_count_gnss + 1u;
         return VEHICLE_GATED;
     }
-    if (t71) { flags |= VEHICLE_ANOMALY; }
-    if (!vehicle_finite(nis + x_next + y_next + t70 + speed_next + gyro_bias_next)) {
+    if (t70) { flags |= VEHICLE_ANOMALY; }
+    if (!vehicle_finite(nis + x_next + y_next + heading_next + speed_next + gyro_bias_next)) {
         return VEHICLE_NOT_FINITE;
     }
 
     /* store */
     kf->x[VEHICLE_X] = x_next;
     kf->x[VEHICLE_Y] = y_next;
-    kf->x[VEHICLE_HEADING] = t70;
+    kf->x[VEHICLE_HEADING] = vehicle_wrap(heading_next, 3.1415927f);
     kf->x[VEHICLE_SPEED] = speed_next;
     kf->x[VEHICLE_GYRO_BIAS] = gyro_bias_next;
     kf->U[0] = u_x_y_next;
@@ -465,28 +471,27 @@ vehicle_status_t vehicle_update_speed(vehicle_t *kf, const vehicle_speed_t *z)
     const float heading_next = kf->x[VEHICLE_HEADING] + t1 * u_heading_speed_next * y_v;
     const float gyro_bias_next = kf->x[VEHICLE_GYRO_BIAS] + t1 * u_gyro_bias_speed_next * y_v;
     const float speed_next = speed + t1 * y_v;
-    const float t2 = vehicle_wrap(heading_next, 3.1415927f);
 
     /* guards */
     if (!vehicle_finite(y_v + s_v)) { return VEHICLE_NOT_FINITE; }
     if (!(s_v > 0.0f)) { return VEHICLE_NOT_POSITIVE; }
 
     /* gate */
-    const bool t3 = nis > 15.136705f;
-    if (t3 && kf->gate_count_speed < 10u) {
+    const bool t2 = nis > 15.136705f;
+    if (t2 && kf->gate_count_speed < 10u) {
         kf->nis = nis;
         kf->gate_count_speed = kf->gate_count_speed + 1u;
         return VEHICLE_GATED;
     }
-    if (t3) { flags |= VEHICLE_ANOMALY; }
-    if (!vehicle_finite(nis + x_next + y_next + t2 + speed_next + gyro_bias_next)) {
+    if (t2) { flags |= VEHICLE_ANOMALY; }
+    if (!vehicle_finite(nis + x_next + y_next + heading_next + speed_next + gyro_bias_next)) {
         return VEHICLE_NOT_FINITE;
     }
 
     /* store */
     kf->x[VEHICLE_X] = x_next;
     kf->x[VEHICLE_Y] = y_next;
-    kf->x[VEHICLE_HEADING] = t2;
+    kf->x[VEHICLE_HEADING] = vehicle_wrap(heading_next, 3.1415927f);
     kf->x[VEHICLE_SPEED] = speed_next;
     kf->x[VEHICLE_GYRO_BIAS] = gyro_bias_next;
     kf->U[0] = u_x_y_next;
@@ -547,7 +552,7 @@ vehicle_status_t vehicle_set_covariance(vehicle_t *kf, const vehicle_real_t P[25
     for (int j = 5 - 1; j >= 0; j--) {
         const float round_off = 5.9604645e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return VEHICLE_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return VEHICLE_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -592,4 +597,4 @@ void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25])
         }
     }
 }
-/* kfgen: body 44cb51002c56bd4604dc93075b2b71dd */
+/* kfgen: body c99878d44f68da6f3b9eede3990dced9 */

@@ -3,8 +3,10 @@
 
 #include <math.h>
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
 #error "vehicle_tutorial tests for NaN and infinity, which -ffast-math removes"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "vehicle_tutorial tests for NaN and infinity, which -ffinite-math-only removes"
 #endif
 
 /* constants: in flash on AVR too, where what is only const takes RAM */
@@ -22,10 +24,13 @@ static const uint8_t vehicle_tutorial_order[4] VEHICLE_TUTORIAL_flash = {
     0, 2, 1, 3
 };
 
-/* false for NaN and for infinity: their difference from themselves is NaN */
+/* false for NaN and for infinity, by their bits: no compiler may take these for granted */
 static bool vehicle_tutorial_finite(float a)
 {
-    return a - a >= 0.0f;
+    const uint32_t exponent = 0x7f800000u;
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return (view.bits & exponent) != exponent;
 }
 
 vehicle_tutorial_status_t vehicle_tutorial_init(vehicle_tutorial_t *kf)
@@ -229,7 +234,7 @@ vehicle_tutorial_status_t vehicle_tutorial_update_position(vehicle_tutorial_t *k
     const float th_next = kf->x[VEHICLE_TUTORIAL_TH] + t22 * y_x + t27 * nu_y;
 
     /* guards */
-    if (!vehicle_tutorial_finite(px_next + py_next + v_next + th_next + nis)) {
+    if (!vehicle_tutorial_finite(px_next + py_next + v_next + th_next + nis + s_x + s_y)) {
         return VEHICLE_TUTORIAL_NOT_FINITE;
     }
     if (!(s_x > 0.0f) || !(s_y > 0.0f)) { return VEHICLE_TUTORIAL_NOT_POSITIVE; }
@@ -291,7 +296,7 @@ vehicle_tutorial_status_t vehicle_tutorial_set_covariance(vehicle_tutorial_t *kf
     for (int j = 4 - 1; j >= 0; j--) {
         const float round_off = 4.7683716e-7f * p[j * (j + 1) / 2 + j];
         const float pivot = w[j * (j + 1) / 2 + j];
-        if (pivot < -round_off) { return VEHICLE_TUTORIAL_NOT_POSITIVE; }
+        if (!(-round_off <= pivot)) { return VEHICLE_TUTORIAL_NOT_POSITIVE; }
         const float d = round_off < pivot ? pivot : 0.0f;
         w[j * (j + 1) / 2 + j] = d;
         for (int i = j - 1; i >= 0; i--) {
@@ -336,4 +341,4 @@ void vehicle_tutorial_get_covariance(const vehicle_tutorial_t *kf, vehicle_tutor
         }
     }
 }
-/* kfgen: body 2fee49a2cf310db0d59a27a19d9f4c33 */
+/* kfgen: body 0308ad4cafa461730db0147e9ae1b1ab */

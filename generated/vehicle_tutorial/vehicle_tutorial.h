@@ -15,7 +15,7 @@
  *
  * RAM 60 bytes a filter. Operations:
  *   predict          62 mul, 35 add, 9 div, 3 compare, 1 cos, 6 select, 1 sin
- *   update_position  58 mul, 40 add, 6 div, 2 compare
+ *   update_position  58 mul, 42 add, 6 div, 2 compare
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * a474ff33431a763b81a09b8342d3676dd548ea0e0ec4da0bd7d9d103439ecde6
@@ -104,7 +104,7 @@ vehicle_tutorial_status_t vehicle_tutorial_predict(vehicle_tutorial_t *kf);
  * @param z   x [m], y [m]
  * @return VEHICLE_TUTORIAL_OK, or an error that leaves *kf as it was
  *
- * 58 mul, 40 add, 6 div, 2 compare.
+ * 58 mul, 42 add, 6 div, 2 compare.
  */
 vehicle_tutorial_status_t vehicle_tutorial_update_position(vehicle_tutorial_t *kf,
                                                            const vehicle_tutorial_position_t *z);
@@ -142,4 +142,4 @@ void vehicle_tutorial_get_covariance(const vehicle_tutorial_t *kf, vehicle_tutor
 #endif
 
 #endif
-/* kfgen: body 08241045401b792de2f36a4638b46f5a */
+/* kfgen: body f9bb3b14ff9711f20b44e9e79f2cdf72 */

@@ -135,7 +135,7 @@ def _in_loops(
         return list(forms)
     kernels = Kernels(scalar.smallest, taken, several=len(models) > 1)
     steps = any(model.options.adapt_Q is not None for model in models)
-    weighted = any(model.options.influence is not None for model in models)
+    weighted = any(o.influence is not None for model in models for o in model.every_options)
     out = []
     for place, (model, form) in enumerate(zip(models, forms, strict=True)):
         names = [model.states[i] for i in form.order]

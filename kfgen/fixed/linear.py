@@ -9,11 +9,12 @@ from kfgen.model import Model
 def linear(code: FilterCode) -> bool:
     """Whether it is: a linear model of constant coefficients, whose noises nothing adapts."""
     model, options = code.model, code.model.options
-    if code.modes or options.influence is not None or options.inflation is not None:
+    every = model.every_options
+    if code.modes or any(o.influence or o.inflation or o.adapt_R is not None for o in every):
         return False
     if model.spec.filter.type != "kf" and not _constant(model):
         return False
-    return model.dt is not None and options.adapt_R is None and options.adapt_Q is None and not model.definitions
+    return model.dt is not None and options.adapt_Q is None and not model.definitions
 
 
 def _constant(model: Model) -> bool:

@@ -7,7 +7,7 @@ fold as it runs, so the algorithm is written in full and what is emitted is what
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -113,8 +113,11 @@ class Trace:
         self.raised: list[tuple[Value, str]] = []  # conditions of warnings, and which
         self.depth = 0  # of loops and branches
         self.names: dict[Node, str] = {}
+        self.arguments_at: int | None = None  # where in the body what the function is given is tested
+        self.needed: dict[str, Value] = {}  # path of something given -> whether it counts, where it does not always
         self.doubts: list[tuple[Value, str]] = []  # conditions under which an assumption made fails, and why
         self.declared: Counter[str] = Counter()
+        self.declared_signs: Mapping[str, int] = {}  # of fields, by their path, where a question supposes them
         self.signs: dict[Node, int] = {}  # what is known of the sign of values (see filters.numbers)
 
         self.zero = self.wrapped(self.pool.zero)

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
 import sympy
 
-from kfgen.errors import KfgenError, Mistake, Place, SpecError
+from kfgen.errors import Mistake, Place, SpecError
 from kfgen.geometry import Part, part_of
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
-from kfgen.model.options import INNOVATION, Options, build_options
+from kfgen.model.options import INNOVATION, GateModel, Options, build_gate, build_options
+from kfgen.model.start import initial_covariance
 from kfgen.model.symbolic import constants, partials, to_sympy
+from kfgen.spec.sensors import filter_of
 from kfgen.spec.tree import Expression
-from kfgen.spec.types import Matrix, Noise, Sensor, Spec
+from kfgen.spec.types import Filter, Matrix, Noise, Sensor, Spec
 
 Symbolic = Any  # a SymPy expression
 
@@ -42,7 +44,8 @@ class SensorModel:
     periods: tuple[Fraction | None, ...]
     noises: tuple[NoiseModel, ...]
     noise_covariance: tuple[tuple[Symbolic, ...], ...]
-    gate: Fraction | None  # probability
+    gate: GateModel | None
+    options: Options | None = None  # where it has some of its own
 
     @property
     def name(self) -> str:
@@ -121,12 +124,25 @@ class Model:
     def sensor_expressions(self, sensor: SensorModel) -> list[Symbolic]:
         """All expressions that an update of the sensor evaluates."""
         out = [*sensor.h, *(r for r in sensor.residual if r is not None)]
+        out += [] if sensor.gate is None or sensor.gate.threshold is None else [sensor.gate.threshold]
         for matrix in (sensor.R, sensor.noise_covariance):
             out += [entry for row in matrix for entry in row]
         return out
 
     def dynamics_expressions(self) -> list[Symbolic]:
         return [*self.f, *(e for m in (self.Q, self.noise_covariance) for row in m for e in row)]
+
+    @property
+    def every_options(self) -> tuple[Options, ...]:
+        """Those of the filter, and those that sensors have of their own."""
+        return (self.options, *(s.options for s in self.sensors if s.options is not None))
+
+    def of(self, sensor: SensorModel) -> Model:
+        """With the options of one sensor."""
+        if sensor.options is None:
+            return self
+        spec = replace(self.spec, filter=filter_of(self.spec.filter, sensor.spec))
+        return replace(self, spec=spec, options=sensor.options)
 
     def uses_time(self) -> bool:
         """Whether anything depends on t, so that the filter has to keep it."""
@@ -190,7 +206,7 @@ class _Builder:
                 None if step.minimum is None else self.number(step.minimum),
                 None if step.maximum is None else self.number(step.maximum),
             )
-        model = Model(
+        return Model(
             spec=spec,
             symbols=self.symbols,
             definitions=definitions,
@@ -201,7 +217,7 @@ class _Builder:
             Q=Q,
             sensors=tuple(self.sensor(s) for s in spec.measurements),
             x0=tuple(self.number(s.init, folded) for s in spec.states),
-            P0=self.initial_covariance(folded),
+            P0=initial_covariance(spec, lambda e: self.number(e, folded)),
             periods=tuple(None if s.period is None else self.number(s.period) for s in spec.states),
             bounds=tuple(
                 None if s.bounds is None else (self.number(s.bounds[0]), self.number(s.bounds[1])) for s in spec.states
@@ -211,12 +227,13 @@ class _Builder:
             parameters=tuple(parameters),
             dt=fixed,
             dt_limits=limits,
-            options=build_options(
-                spec.filter, [s.name for s in spec.states], self.number,
-                lambda e: self.tree(e, {**self.names, INNOVATION.name: INNOVATION}),
-            ),
+            options=self.options(spec.filter),
         )
-        return model
+
+    def options(self, chosen: Filter) -> Options:
+        names = {**self.names, INNOVATION.name: INNOVATION}
+        states = [s.name for s in self.spec.states]
+        return build_options(chosen, states, self.number, lambda e: self.tree(e, names))
 
     # pieces ------------------------------------------------------------------------------------------
 
@@ -276,21 +293,6 @@ class _Builder:
             periods=tuple(None if c.period is None else self.number(c.period) for c in sensor.components),
             noises=self.noises(sensor.noise),
             noise_covariance=self.covariance(sensor.noise, sensor.noise_covariance),
-            gate=None if sensor.gate is None else self.number(sensor.gate.probability),
+            gate=build_gate(sensor.gate, self.number, self.tree),
+            options=self.options(filter_of(self.spec.filter, sensor)) if sensor.own else None,
         )
-
-    def initial_covariance(self, names: Mapping[str, Symbolic]) -> tuple[tuple[Fraction, ...], ...]:
-        spec = self.spec
-        if spec.P0 is not None:
-            return tuple(tuple(self.number(e, names) for e in row) for row in spec.P0)
-        index = {s.name: i for i, s in enumerate(spec.states)}
-        n = len(index)
-        P = [[Fraction(0)] * n for _ in range(n)]
-        for i, state in enumerate(spec.states):
-            if state.variance is None:
-                raise KfgenError(f"state {state.name} has neither std nor var")
-            P[i][i] = self.number(state.variance, names)
-        for c in spec.covariances:
-            i, j = index[c.first], index[c.second]
-            P[i][j] = P[j][i] = self.number(c.value, names)
-        return tuple(map(tuple, P))

@@ -10,7 +10,7 @@ from typing import Any
 import sympy
 
 from kfgen.spec.tree import Expression
-from kfgen.spec.types import Adaptive, Filter, Robust, SigmaPoints
+from kfgen.spec.types import Adaptive, Filter, Gate, Robust, SigmaPoints
 
 Symbolic = Any  # a SymPy expression
 INNOVATION = sympy.Symbol("e")  # what psi is a function of
@@ -34,6 +34,14 @@ class Inflation:
 
     probability: Fraction
     threshold: Fraction | None
+
+
+@dataclass(frozen=True)
+class GateModel:
+    """The test of a whole vector: the quantile of a probability, or (probability None) a threshold, a formula."""
+
+    probability: Fraction | None
+    threshold: Symbolic = None
 
 
 @dataclass(frozen=True)
@@ -89,6 +97,17 @@ def build_options(
         rejects=chosen.reject is not None,
         reject=symbolic(chosen.reject) if isinstance(chosen.reject, Expression) else None,
     )
+
+
+def build_gate(
+    gate: Gate | None, number: Callable[[Expression], Fraction], symbolic: Callable[[Expression], Symbolic]
+) -> GateModel | None:
+    if gate is None:
+        return None
+    if gate.threshold is not None:
+        return GateModel(None, symbolic(gate.threshold))
+    assert gate.probability is not None
+    return GateModel(number(gate.probability))
 
 
 def _points(

@@ -171,7 +171,8 @@ class NativeFilter:
         """The filters of the modes in the spec's order (imm only)."""
         if self.spec.imm is None:
             raise AttributeError(f"filter {self.name} has no modes; it is no imm")
-        return tuple(ModeView(self.struct, mode.name) for mode in self.spec.imm.modes)
+        names = [mode.name for mode in self.spec.imm.modes]
+        return tuple(ModeView(self.struct, names, place) for place in range(len(names)))
 
     @property
     def parameters(self) -> Parameters:

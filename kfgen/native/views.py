@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, MutableMapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,30 @@ from kfgen.native.values import Array
 class ModeView:
     """One mode of a bank: its own estimate."""
 
-    def __init__(self, struct: Struct, name: str) -> None:
+    def __init__(self, struct: Struct, names: Sequence[str], place: int) -> None:
         self._struct = struct
-        self.name = name
+        self.name = names[place]
+        self._certain = np.array([float(i == place) for i in range(len(names))])
 
     @property
     def x(self) -> Array:
         """The mode's state [n]."""
         return self._struct.value.to_physical(self.raw["x"], self._struct.units.x)
+
+    @property
+    def P(self) -> Array:
+        """The mode's covariance [n, n]: that of the bank if it were certain of the mode."""
+        other = self._struct.copy()
+        mu = other.raw(self._certain, other.units.one)
+        assert mu is not None
+        other.data.mu = mu.tolist()
+        return other.get("get_covariance", other.units.P)
+
+    @property
+    def nis(self) -> float:
+        """The normalised innovation squared of the mode in the last update."""
+        raw = np.array(self.raw["nis"], self._struct.value.dtype)
+        return float(self._struct.value.to_physical(raw, self._struct.units.one))
 
     @property
     def raw(self) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.linalg import symmetric
 from kfgen.reference.model import Context, Model
 from kfgen.reference.sensor import Reading, SensorModel
+from kfgen.spec.sensors import filter_of
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,9 @@ class Adaptation:
         """The spec's R and Q, which are constant, and no residuals."""
         model, adapted = self.model, NOTHING
         context = Context(model.values, np.zeros(len(model.inputs)), 0.0, 0.0)
-        if self.R:
-            sensors = [SensorModel(model, sensor) for sensor in model.spec.measurements]
+        learnt = [s for s in model.spec.measurements if filter_of(model.spec.filter, s).adapt_R is not None]
+        if learnt:
+            sensors = [SensorModel(model, sensor) for sensor in learnt]
             R = {sensor.name: sensor.noise(model.x0, context) for sensor in sensors}
             adapted = replace(adapted, R=R, e={sensor.name: np.zeros(sensor.m) for sensor in sensors})
         if self.Q:

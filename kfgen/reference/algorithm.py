@@ -20,6 +20,7 @@ from kfgen.reference.linalg import lower_root, udu
 from kfgen.reference.model import Context, Model
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
+from kfgen.spec.sensors import filter_of
 from kfgen.spec.tree import Expression
 from kfgen.spec.types import Filter
 
@@ -67,6 +68,10 @@ class Estimator(ABC):
     options: tuple[Filter, ...]
     fixed_covariance = False
 
+    def of(self, sensor: str) -> Estimator:
+        """The same with the options of one sensor, for its updates."""
+        return self
+
     @abstractmethod
     def initial(self) -> Estimate:
         """The estimate after init."""
@@ -78,6 +83,10 @@ class Estimator(ABC):
     @abstractmethod
     def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
         """The innovation of a reading, by the plain residual and covariance: what the gate judges."""
+
+    def nis_of_modes(self, innovation: Innovation) -> tuple[float, ...]:
+        """The nis of each filter of a bank."""
+        return (innovation.nis,)
 
     @abstractmethod
     def judge(self, innovation: Innovation, reading: Reading, rejected: int) -> Status:
@@ -110,6 +119,15 @@ class Algorithm(Estimator):
         self.limits = Limits(model)
         self.adaptation = Adaptation(model)
         self._gates = Gates(model)
+        self._own: dict[str, Algorithm] = {}
+        for sensor in model.spec.measurements:
+            if sensor.own:
+                others = tuple(replace(each, own={}) for each in model.spec.measurements)
+                chosen = filter_of(model.spec.filter, sensor)
+                self._own[sensor.name] = type(self)(Model(replace(model.spec, filter=chosen, measurements=others)))
+
+    def of(self, sensor: str) -> Algorithm:
+        return self._own.get(sensor, self)
 
     def initial(self) -> Estimate:
         return Estimate(self.model.x0, self.model.P0, adapted=self.adaptation.initial())

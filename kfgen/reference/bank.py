@@ -71,10 +71,13 @@ class Bank(Estimator):
     def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
         """The innovations of all modes; nis is the smallest of theirs."""
         found = _each(
-            partial(algorithm.innovate, mode, _own(algorithm, reading))
+            partial(algorithm.of(reading.sensor.name).innovate, mode, _own(algorithm, reading))
             for algorithm, mode in zip(self.algorithms, _bank(estimate).modes, strict=True)
         )
         return Innovation(min(innovation.nis for innovation in found), tuple(found))
+
+    def nis_of_modes(self, innovation: Innovation) -> tuple[float, ...]:
+        return tuple(part.nis for part in _innovations(innovation))
 
     def judge(self, innovation: Innovation, reading: Reading, rejected: int) -> Status:
         """The most willing mode decides for all of them.
@@ -90,7 +93,7 @@ class Bank(Estimator):
         """Each mode updated, and weighed by its likelihood."""
         bank = _bank(estimate)
         made = _each(
-            partial(algorithm.correct, mode, _own(algorithm, reading), part)
+            partial(algorithm.of(reading.sensor.name).correct, mode, _own(algorithm, reading), part)
             for algorithm, mode, part in zip(self.algorithms, bank.modes, _innovations(innovation), strict=True)
         )
         mu, log_likelihood = weighed(bank.mu, np.array([one.log_likelihood for one in made]), self._floor)

@@ -49,7 +49,7 @@ class Ekf(Algorithm):
 
     def linearise(self, estimate: Estimate, reading: Reading) -> Linearisation:
         """The prediction of the reading, its Jacobian, and the covariance of its noise."""
-        return reading.sensor.linearise(estimate.x, reading)
+        return reading.sensor.linearise(estimate.x, reading, learnt=self.adaptation.R)
 
     def predict(self, estimate: Estimate, context: Context) -> tuple[Estimate, Status]:
         """x <- f(x, u, 0); P <- F P F^T + Q + G Qw G^T, with F, G and Q at the prior x."""

@@ -17,6 +17,7 @@ from kfgen.reference.log import Run, replay
 from kfgen.reference.mode import ModeView
 from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.parameters import Parameters
+from kfgen.reference.reading import Read
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.types import Filter, Spec
@@ -45,6 +46,7 @@ class ReferenceFilter:
         self.sensors = algorithm.sensors
         self._step = step_of(spec, self.model.number)
         self._fixed = fixed_step(spec)
+        self._read = Read(spec)
         self.init()
 
     @property
@@ -113,6 +115,7 @@ class ReferenceFilter:
         # without a dt the spec has no seconds: t then counts steps
         self._clock = Clock(Fraction(1) if self.spec.dt is None else self._fixed)
         self.nis = 0.0
+        self.nis_of_modes = (0.0,) * len(self.algorithm.options)
         self.log_likelihood = 0.0
         self.gate_count = dict.fromkeys(self.sensors, 0)
         self._uninitialised = self.spec.initialize is not None
@@ -176,7 +179,8 @@ class ReferenceFilter:
             raise TypeError("predict: this filter takes dt")
         try:
             step, flags = self._step.nominal, Status.OK
-            if not np.isfinite(inputs).all() or (dt is not None and not math.isfinite(dt)):
+            self._test(self._read.predict, inputs)
+            if dt is not None and not math.isfinite(dt):
                 raise StepError(Status.NOT_FINITE)
             if self._step.run_time and dt is not None:
                 step, flags = self._step.clamped(float(dt))
@@ -202,7 +206,8 @@ class ReferenceFilter:
             return int(Status.OK)
         reading = Reading(model, measured, used, Context(self.parameters, inputs, self._clock.now, 0.0))
         try:
-            if not np.isfinite(measured[list(used)]).all() or not np.isfinite(inputs).all():
+            self._test(self._read.update(sensor, used), inputs)
+            if not np.isfinite(measured[list(used)]).all():
                 raise StepError(Status.NOT_FINITE)
             if self._initialises(reading):
                 return int(self._initialise(reading))
@@ -224,18 +229,27 @@ class ReferenceFilter:
             return np.zeros(len(self.model.inputs))
         return np.array(u, dtype=np.float64).reshape(len(self.model.inputs))
 
+    def _test(self, read: frozenset[str], inputs: Vector) -> None:
+        """Raises NOT_FINITE for an input or a parameter that is read and is not finite."""
+        given = {**dict(zip(self.model.inputs, map(float, inputs), strict=True)), **self.parameters}
+        if not all(math.isfinite(value) for name, value in given.items() if name in read):
+            raise StepError(Status.NOT_FINITE)
+
     def _judge(self, reading: Reading) -> Status:
         """An update behind the gate: the whole vector, or nothing of it."""
         name = reading.sensor.name
-        innovation = self.algorithm.innovate(self._estimate, reading)
+        algorithm = self.algorithm.of(name)
+        innovation = algorithm.innovate(self._estimate, reading)
+        every = self.algorithm.nis_of_modes(innovation)
         verdict = self.algorithm.judge(innovation, reading, self.gate_count[name])
         if verdict == Status.GATED:
-            self.nis = innovation.nis
+            self.nis, self.nis_of_modes = innovation.nis, every
             self.gate_count[name] += 1
             return verdict
-        correction: Correction = self.algorithm.correct(self._estimate, reading, innovation)
+        correction: Correction = algorithm.correct(self._estimate, reading, innovation)
         self._estimate = correction.estimate
         self.nis, self.log_likelihood = innovation.nis, correction.log_likelihood
+        self.nis_of_modes = every
         self.gate_count[name] = 0
         return verdict | correction.flags
 

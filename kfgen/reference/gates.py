@@ -2,36 +2,51 @@
 
 from __future__ import annotations
 
+import math
+
 from kfgen.reference.chi2 import chi2_quantile
+from kfgen.reference.dual import value_of
 from kfgen.reference.model import Model
 from kfgen.reference.sensor import Reading
-from kfgen.reference.status import Status
-from kfgen.spec.types import Gate
+from kfgen.reference.status import Status, StepError
 
 
 class Gates:
     """Bar-Shalom, Li & Kirubarajan 2001, section 5.4."""
 
     def __init__(self, model: Model) -> None:
-        self._gates: dict[str, tuple[Gate, float]] = {
-            sensor.name: (sensor.gate, model.number(sensor.gate.probability))
-            for sensor in model.spec.measurements
-            if sensor.gate is not None
+        self.model = model
+        self._gates = {sensor.name: sensor.gate for sensor in model.spec.measurements if sensor.gate is not None}
+        self._formulas = {
+            name: model.scope.compile(gate.threshold)
+            for name, gate in self._gates.items()
+            if gate.threshold is not None
         }
-        self._thresholds: dict[tuple[str, int], float] = {}
+        self._quantiles: dict[tuple[str, int], float] = {}
 
     def judge(self, reading: Reading, nis: float, rejected: int) -> Status:
         """OK where a reading with this nis passes, GATED where it does not, and ANOMALY where it fails but so
-        many of its sensor have been rejected in a row that it is taken all the same."""
+        many of its sensor have been rejected in a row that it is taken all the same.
+
+        Raises StepError NOT_FINITE for a threshold that is not finite.
+        """
         name = reading.sensor.name
-        if name not in self._gates or nis <= self._threshold(name, len(reading.used)):
+        if name not in self._gates or nis <= self._threshold(reading):
             return Status.OK
-        reset_after = self._gates[name][0].reset_after
+        reset_after = self._gates[name].reset_after
         return Status.GATED if reset_after is None or rejected < reset_after else Status.ANOMALY
 
-    def _threshold(self, sensor: str, used: int) -> float:
-        """The chi-square quantile of a sensor's gate with so many components."""
-        key = (sensor, used)
-        if key not in self._thresholds:
-            self._thresholds[key] = chi2_quantile(self._gates[sensor][1], used)
-        return self._thresholds[key]
+    def _threshold(self, reading: Reading) -> float:
+        """The formula of a sensor's gate, or its chi-square quantile with so many components."""
+        name, used = reading.sensor.name, len(reading.used)
+        if name in self._formulas:
+            value = value_of(self._formulas[name](self.model.environment(reading.context, self.model.x0)))
+            if not math.isfinite(value):
+                raise StepError(Status.NOT_FINITE)
+            return value
+        key = name, used
+        if key not in self._quantiles:
+            probability = self._gates[name].probability
+            assert probability is not None
+            self._quantiles[key] = chi2_quantile(self.model.number(probability), used)
+        return self._quantiles[key]

@@ -42,7 +42,7 @@ class ReferenceImm(ReferenceFilter):
     @property
     def modes(self) -> tuple[ModeView, ...]:
         return tuple(
-            ModeView(name, options, partial(self._mode_estimate, i))
+            ModeView(name, options, partial(self._mode_estimate, i), self.nis_of_modes[i])
             for i, (name, options) in enumerate(zip(self._names, self._bank.options, strict=True))
         )
 

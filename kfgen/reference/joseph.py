@@ -134,11 +134,15 @@ def sequential(P: Matrix, H: Matrix, R: Matrix, y: Vector, rules: Rules = PLAIN)
             P, c = inflation * P, inflation * c
             s = r + g * c
             flags |= Status.ANOMALY
+        if not math.isfinite(s):
+            raise StepError(Status.NOT_FINITE)
         if s < rules.floor:
             r, s = r + rules.floor - s, rules.floor
             flags |= Status.REGULARIZED
         K = P @ h / s
         K[list(rules.consider)] = 0.0
+        if np.any(np.abs(K) > rules.limit):
+            flags |= Status.REGULARIZED
         K = np.clip(K, -rules.limit, rules.limit)
         P = _joseph(P, K, h, r, g)
         steps.append(K * nu)

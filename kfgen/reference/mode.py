@@ -13,12 +13,13 @@ from kfgen.spec.types import Filter
 class ModeView:
     """One mode of a bank, as it is at present.
 
-    Attributes (arrays are copies): name; x (n), P (n, n), sqrt_covariance (n, n): the mode's own estimate;
+    Attributes (arrays are copies): name; x (n), P (n, n), sqrt_covariance (n, n): the mode's own estimate; nis;
     R: sensor -> (m, m), Q (n, n): its adapted noise covariances. As in ReferenceFilter.
     """
 
-    def __init__(self, name: str, options: Filter, estimate: Callable[[], Estimate]) -> None:
+    def __init__(self, name: str, options: Filter, estimate: Callable[[], Estimate], nis: float) -> None:
         self.name = name
+        self.nis = nis
         self._options = options
         self._estimate = estimate
 

@@ -13,6 +13,7 @@ from kfgen.errors import SpecError
 from kfgen.reference.dual import Dual, Matrix, Number, Vector, hessian, jacobian, values, variables
 from kfgen.reference.linalg import check_covariance, symmetric
 from kfgen.reference.model import Context, Model
+from kfgen.reference.reading import in_use
 from kfgen.reference.status import Status, StepError
 
 Numbers = list[Number]
@@ -62,7 +63,7 @@ class Process:
         self._substeps = dynamics.substeps
         self._f = [model.scope.compile(dynamics.f[name]) if name in dynamics.f else None for name in model.states]
         self._Q = model.covariance(dynamics.Q, model.states)
-        self._Qw = model.noise_covariance(spec.noise, spec.noise_covariance)
+        self._Qw = model.noise_covariance(in_use(spec, spec.noise, dynamics.f.values()), spec.noise_covariance)
         names = [noise.name for noise in spec.noise]
         self._held = [i for i, noise in enumerate(spec.noise) if not noise.density]
         self._white = [i for i, noise in enumerate(spec.noise) if noise.density]

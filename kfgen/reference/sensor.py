@@ -11,6 +11,7 @@ from kfgen.reference.dual import Matrix, Number, Vector, jacobian, value_of, val
 from kfgen.reference.evaluate import Closure, renamed
 from kfgen.reference.linalg import symmetric
 from kfgen.reference.model import PREDICTED, Context, Model, Z, wrap
+from kfgen.reference.reading import in_use
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Sensor
@@ -66,7 +67,8 @@ class SensorModel:
         self._R = model.covariance(own if sensor.R is None else sensor.R, self.components)
         self.bent = tuple(c.residual is not None or c.period is not None for c in sensor.components)
         self._noises = [noise.name for noise in sensor.noise]
-        self._Re = model.noise_covariance(sensor.noise, sensor.noise_covariance)
+        predicted = [component.h for component in sensor.components]
+        self._Re = model.noise_covariance(in_use(model.spec, sensor.noise, predicted), sensor.noise_covariance)
         self.takes_inputs = bool(_reach(model, sensor) & set(model.inputs))
 
     def predict(self, x: Sequence[Number], e: Sequence[Number], context: Context, used: Sequence[int]) -> list[Number]:
@@ -74,8 +76,8 @@ class SensorModel:
         environment = self.model.environment(context, x, dict(zip(self._noises, e, strict=True)))
         return [self._h[i](environment) for i in used]
 
-    def linearise(self, x: Vector, reading: Reading) -> Linearisation:
-        """h, H and R + M Re M^T at x (n), M = dh/de at e = 0. Raises StepError NOT_FINITE.
+    def linearise(self, x: Vector, reading: Reading, learnt: bool = False) -> Linearisation:
+        """h, H and R + M Re M^T at x (n), M = dh/de at e = 0; learnt: without R. Raises StepError NOT_FINITE.
 
         Whether R is a covariance is for the update to judge, after all that could be not finite.
         """
@@ -85,7 +87,7 @@ class SensorModel:
         derivatives = jacobian(predicted, n + k)
         h, H, M = values(predicted), derivatives[:, :n], derivatives[:, n:]
         inputs = M @ self.input_covariance(x, reading.context) @ M.T
-        R = symmetric(self.noise(x, reading.context, reading.used) + inputs)
+        R = symmetric(inputs if learnt else self.noise(x, reading.context, reading.used) + inputs)
         if not (np.isfinite(h).all() and np.isfinite(H).all() and np.isfinite(R).all()):
             raise StepError(Status.NOT_FINITE)
         return Linearisation(h, H, R, symmetric(inputs))
@@ -155,6 +157,7 @@ def _reach(model: Model, sensor: Sensor) -> set[str]:
     formulas: list[Expression | None] = []
     for component in sensor.components:
         formulas += [component.h, component.variance]
+    formulas += [] if sensor.gate is None else [sensor.gate.threshold]
     formulas += [noise.variance for noise in sensor.noise]
     for matrix in (sensor.R, sensor.noise_covariance):
         formulas += [entry for row in matrix or () for entry in row]

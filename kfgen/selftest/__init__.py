@@ -13,6 +13,8 @@ from kfgen.emit.render import render_c
 from kfgen.emit.text import WIDTH
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.generate import Generated
+from kfgen.ir.given import given
+from kfgen.ir.program import walk
 from kfgen.scalar_names import DOUBLE
 from kfgen.scalars import SCALARS, Scalar
 from kfgen.selftest.exact import record_exactly
@@ -46,6 +48,7 @@ class Update:
     first: int
     every: int
     arguments: str
+    read: tuple[str, ...] = ()  # the inputs that it reads
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,7 @@ class SelfTest:
     periods: tuple[tuple[str, str], ...]
     arrays: tuple[Array, ...]
     near: Nearness | None  # None: to the bit
+    read: tuple[str, ...] = ()  # the inputs that a prediction reads
 
 
 def selftest(spec: Spec, generated: Generated, track: Track | None = None) -> dict[str, str]:
@@ -103,7 +107,8 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
     for sensor in spec.measurements:
         takes_u = declared.takes(f"update_{sensor.name}", "u")
         names = tuple(component.name for component in sensor.components)
-        sensors.append(Update(sensor.name, names, first, 1 + len(sensors), ", &u" if takes_u else ""))
+        read = _read(spec, generated, f"update_{sensor.name}")
+        sensors.append(Update(sensor.name, names, first, 1 + len(sensors), ", &u" if takes_u else "", read))
         first += len(names)
     takes = [name for name in ("u", "dt") if declared.takes("predict", name)]
     uses_u = "u" in takes or any(each.arguments for each in sensors)
@@ -132,8 +137,15 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
         generated.view, f"{generated.view.command} --selftest", len(found.x), tuple(i.name for i in spec.inputs) if
         uses_u else (), tuple(sensors), first, "".join({"u": ", &u", "dt": ", dt"}[name] for name in takes),
         "dt" in takes, found.variance is not None, tuple(periods), tuple(arrays),
-        None if exact else _nearness(spec, scalar, found.tolerance),
+        None if exact else _nearness(spec, scalar, found.tolerance), _read(spec, generated, "predict"),
     )  # fmt: skip
+
+
+def _read(spec: Spec, generated: Generated, function: str) -> tuple[str, ...]:
+    """The inputs that a function of the filter reads."""
+    (body,) = [f.body for f in generated.code.functions if f.name == function]
+    found = given(walk(body))
+    return tuple(each.name for each in spec.inputs if f"u.{each.name}" in found)
 
 
 def _nearness(spec: Spec, scalar: Scalar, tolerance: float) -> Nearness:

@@ -9,6 +9,7 @@ from kfgen.errors import Place
 from kfgen.scalar_names import is_fixed
 from kfgen.spec.problems import Problems, short
 from kfgen.spec.reserved import C_HEADERS, reserved
+from kfgen.spec.sensors import filter_of
 from kfgen.spec.types import Spec
 
 MAX_NAME = 40
@@ -80,7 +81,7 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
         if sensor.partial:
             text = f"the masked update of the sensor `{sensor.name}`"
             yield f"{lower}_update_{sensor.name}_masked", text, sensor.place
-        if any(f.adapt_R is not None for f in filters):
+        if any(filter_of(f, sensor).adapt_R is not None for f in filters):
             yield f"{lower}_get_R_{sensor.name}", f"the R of the sensor `{sensor.name}`", sensor.place
     for mode in spec.imm.modes if spec.imm else ():
         yield f"{upper}_MODE_{mode.name.upper()}", f"the index of the mode `{mode.name}`", mode.place

@@ -90,6 +90,8 @@ ROBUST = Record(
     ),
 )
 
+ROBUSTNESS = Either(scalar=Choice(("none", "chernodarov", "huber")), mapping=ROBUST)
+
 ADAPTIVE = Record(
     "adaptive",
     (
@@ -167,7 +169,7 @@ FILTER = Record(
         ),
         Key(
             "robust",
-            Either(scalar=Choice(("none", "chernodarov", "huber")), mapping=ROBUST),
+            ROBUSTNESS,
             "Reduces the weight of large innovations; with a ukf only `ud` and `sequential`.",
             "none",
             only=_PER_SCALAR,
@@ -182,7 +184,8 @@ FILTER = Record(
         Key(
             "adapt_R",
             _CONSTANT,
-            "Forgetting factor of the innovation-based adjustment of R, between 0 and 1; R must be constant.",
+            "Forgetting factor of the innovation-based adjustment of R, between 0 and 1; R may use constants and "
+            "parameters, at their spec values.",
             "off",
             only=_PER_SCALAR,
         ),

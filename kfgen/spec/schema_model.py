@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from kfgen.spec.schema_filter import ADAPTIVE, ROBUSTNESS
 from kfgen.spec.shapes import (
     Choice,
     Either,
@@ -188,8 +189,12 @@ GATE = Record(
             "probability",
             CONSTANT,
             "The vector is rejected when its normalised innovation squared exceeds the chi-square quantile "
-            "of this probability, between 0 and 1.",
-            required=True,
+            "of this probability, between 0 and 1; exactly one of `probability` and `threshold`.",
+        ),
+        Key(
+            "threshold",
+            Formula("gate"),
+            "What the normalised innovation squared may not exceed, whichever components are used; greater than 0.",
         ),
         Key(
             "reset_after",
@@ -216,6 +221,14 @@ SENSOR = Record(
         ),
         Key("gate", GATE, "Rejection of outliers."),
         Key("rate", CONSTANT, "Updates a prediction, greater than 0: what budgets roll first is called least.", "1"),
+        Key("robust", ROBUSTNESS, "In place of the filter's; `none`: off.", "the filter's"),
+        Key(
+            "adaptive",
+            Either(scalar=Flag(off="none"), mapping=ADAPTIVE),
+            "In place of the filter's; `none`: off.",
+            "the filter's",
+        ),
+        Key("adapt_R", Formula(words=("none",)), "In place of the filter's; `none`: off.", "the filter's"),
         Key("partial", Flag(), "Also emit update_<sensor>_masked, for some of the components.", "false"),
         DOC,
     ),

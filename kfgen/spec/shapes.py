@@ -17,6 +17,7 @@ SCOPES: dict[str, frozenset[str]] = {
     "residual": frozenset({"constant", "parameter", "state", "input", "definition", "fixed dt", "t", "z", "h"}),
     "psi": frozenset({"constant", "parameter", "fixed dt", "innovation"}),
     "transition": frozenset({"constant", "parameter", "dt"}),
+    "gate": frozenset({"constant", "parameter", "input", "fixed dt"}),
 }
 
 # The same in words, for messages and the reference.
@@ -31,6 +32,7 @@ SCOPE_WORDS: dict[str, str] = {
     "residual": "z, h, constants, parameters, states, inputs, definitions, t and a fixed dt",
     "psi": "e (the normalised innovation), constants, parameters and a fixed dt",
     "transition": "constants, parameters and dt",
+    "gate": "constants, parameters, inputs and a fixed dt",
 }
 
 
@@ -48,7 +50,9 @@ class Choice:
 
 @dataclass(frozen=True)
 class Flag:
-    """true or false."""
+    """true or false; `off` is another word for false."""
+
+    off: str = ""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from kfgen.errors import NOWHERE, Place
 from kfgen.scalar_names import FLOAT
@@ -124,7 +125,10 @@ class Component:
 
 @dataclass(frozen=True)
 class Gate:
-    probability: Expression
+    """Exactly one of the first two is given."""
+
+    probability: Expression | None
+    threshold: Expression | None = None
     reset_after: int | None = None
 
 
@@ -138,6 +142,7 @@ class Sensor:
     gate: Gate | None = None
     partial: bool = False
     rate: Expression | None = None  # calls a prediction; None: 1
+    own: Mapping[str, Any] = field(default_factory=dict)  # robust, adaptive, adapt_R where they are not the filter's
     doc: str = ""
     place: Place = NOWHERE
 

@@ -121,6 +121,8 @@ class Walker:
         if isinstance(shape, Text):
             return self.text(node, path)
         if isinstance(shape, Flag):
+            if node.kind == "text" and node.text == shape.off:
+                return False
             if node.kind == "boolean":
                 return node.text.lower() == "true"
             meant = {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(node.text.lower())

@@ -6,7 +6,7 @@ import re
 import subprocess
 from functools import cache
 from pathlib import Path
-from shutil import copytree
+from shutil import copytree, which
 
 import pytest
 
@@ -104,7 +104,12 @@ def test_every_spec_passes_on_an_emulated_avr(everything, needs):
     """Constants stay in flash. A double has four bytes there, with which the receiver's position cannot be told."""
     needs(*BOARDS["avr"].tools)
     folder = everything("own")
-    assert BOARDS["avr"].status(folder, sources(folder), "-Os") == 1 << [path.stem for path in SPECS].index("gps")
+    names = [path.stem for path in SPECS]
+    for part in (names[::2], names[1::2]):  # its flash does not hold all of them
+        _write_tests(folder, part)
+        files = [f"{name}{end}.c" for name in part for end in ("", "_selftest")]
+        failed = 1 << part.index("gps") if "gps" in part else 0
+        assert BOARDS["avr"].status(folder, [*files, "tests.c"], "-Os") == failed
     data = run(folder, "avr-size", "-A", "program.elf").stdout
     used = sum(int(size) for name, size in re.findall(r"^\.(data|bss)\s+(\d+)", data, re.MULTILINE))
     assert used < 64
@@ -197,6 +202,37 @@ def test_it_notices_a_wrong_filter(tmp_path, old, new):
     head, predict, rest = files["variety.c"].partition("variety_predict(")
     files["variety.c"] = head + predict + rest.replace(old, new)
     assert 1 <= run(built(tmp_path, files, "variety", "-O1"), "./tests").returncode <= 3
+
+
+@pytest.mark.parametrize("scalar", ["float", "double"])
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("return (view.bits & exponent) != exponent;", "return view.bits != 1u;"),  # as if the tests had been removed
+        ("if (!variety_finite(dt)) { return VARIETY_NOT_FINITE; }", ""),
+        ("return VARIETY_NOT_FINITE;", "{ kf->nis = 7; return VARIETY_NOT_FINITE; }"),
+    ],
+)
+def test_it_notices_what_is_not_refused(tmp_path, scalar, old, new):
+    spec = override(loads(VARIETY), scalar)
+    files = files_of(spec)
+    assert old in files["variety.c"]
+    head, found, rest = files["variety.c"].partition("variety_predict(")
+    files["variety.c"] = head.replace(old, new) + found + rest.replace(old, new)
+    steps = len(record(spec, track_of(spec)).x)
+    assert run(built(tmp_path, files, "variety", "-O1"), "./tests").returncode == steps + 1
+
+
+@pytest.mark.skipif(which("clang") is None, reason="no clang")
+@pytest.mark.parametrize("flag", ["-fno-honor-nans", "-fno-honor-infinities"])
+def test_tests_by_bits_last(tmp_path, flag):
+    """Where no macro tells that a compiler takes numbers for finite."""
+    files = files_of(loads(VARIETY))
+    for file, text in files.items():
+        (tmp_path / file).write_text(text)
+    (tmp_path / "main.c").write_text("int variety_selftest(void);\nint main(void) { return variety_selftest(); }\n")
+    compiled(tmp_path, "clang", "-O2", flag, *sources(tmp_path), "main.c", "-lm", "-o", "tests")
+    assert run(tmp_path, "./tests").returncode == 0
 
 
 def test_it_is_the_same_text_every_time_and_leaves_the_filter_alone():

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from kfgen.native import NativeFilter
+from kfgen.reference.reading import read_by_predict, read_by_update
 
 
 class Calls:
@@ -26,6 +27,8 @@ class Calls:
         self.names = ["predict", *self.updates, "set_state"]
         if kf.struct.has("set_covariance"):
             self.names.append("set_covariance")
+        self.read = {function: read_by_update(spec, sensor) for function, sensor in self.updates.items()}
+        self.read["predict"] = read_by_predict(spec)
         self.vectors: dict[str, dict[str, np.ndarray]] = {
             "set_state": {"x": np.full(n, 0.1)},
             "set_covariance": {"P": np.eye(n).ravel()},
@@ -41,6 +44,13 @@ class Calls:
                 self.vectors[name]["dt"] = np.array([0.1])
             if kf.struct.takes(name, "mask"):
                 self.vectors[name]["mask"] = np.array([(1 << m) - 1])
+
+    def leaves(self, name: str, key: str, i: int) -> bool:
+        """Whether a function does not read a number of an argument: an input, or below the diagonal of P."""
+        if key == "u":
+            return self.kf.inputs[i] not in self.read[name]
+        n = len(self.kf.states)
+        return key == "P" and i // n > i % n
 
     def __call__(self, name: str, **changed: np.ndarray | None) -> int:
         """One call; an argument of None is a NULL pointer."""

@@ -7,6 +7,7 @@ of a Python number they are simply looked at.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -87,6 +88,19 @@ def assume_nonnegative(a: Number) -> Number:
     return a
 
 
+def positive_within(a: Number, declared: Mapping[str, int]) -> bool:
+    """Whether a is above zero where inputs and parameters are within what is declared of them. declared: by path, the
+    sign of those whose range excludes 0."""
+    if not isinstance(a, Value):
+        return bool(a > 0)
+    trace = a.trace
+    kept, trace.signs = trace.signs, {node: 2 for node, sign in trace.signs.items() if sign == 2}
+    trace.declared_signs = declared
+    found = is_positive(a)
+    trace.signs, trace.declared_signs = kept, {}
+    return found
+
+
 def _facts(trace: Trace) -> dict[Node, int]:
     return trace.signs
 
@@ -130,8 +144,10 @@ def _derive(trace: Trace, node: Node) -> int:
     match node.op:
         case "add":
             return max(signs) if min(signs) >= 1 else 0
+        case "field":
+            return 2 if trace.declared_signs.get(node.data, 0) > 0 else 0
         case "mul" if node.args[0] is node.args[1]:
-            return max(1, signs[0])
+            return 2 if trace.declared_signs.get(str(node.args[0].data)) else max(1, signs[0])
         case "mul" if node.args[1].op == "mul" and node.args[0] in node.args[1].args:  # a (b a) = b a^2
             other = [n for n in node.args[1].args if n is not node.args[0]] or [node.args[0]]
             return min(1, _sign(trace, other[0]))

@@ -40,6 +40,7 @@ class Scalar:
 
     row: list[Fraction]
     s: Fraction
+    limited: bool = False  # whether gain_limit acts
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Gain:
     P: Exact
     made: list[Scalar]
     plain: list[Scalar]
-    floored: bool  # whether innovation_floor acts
+    floored: bool  # whether innovation_floor or gain_limit acts
 
 
 def steady(F: Exact, Q: Exact, sensors: Sequence[tuple[Exact, Exact]], rules: Rules) -> list[Gain] | None:
@@ -78,6 +79,7 @@ def steady(F: Exact, Q: Exact, sensors: Sequence[tuple[Exact, Exact]], rules: Ru
             floored = any(a.s != b.s for a, b in zip(plain, model.update(after, Rules())[2], strict=False))
             floored = floored or len(plain) != len(model.update(after, Rules())[2])
             M, after, made = model.update(after, rules)
+            floored = floored or any(a.limited for a in made)
             closed = closed - M * model.H * closed
             gains.append(Gain(_fractions(M), _fractions(after), made, plain, floored))
         if not _settled(A * after * A.T + noise, P):
@@ -116,17 +118,18 @@ class _Sensor:
             s = spread + r
             if s <= to_mpf(_SETTLED) * _size(P):  # a direction already known, measured exactly
                 continue
-            K = c / s
+            K, limited = c / s, False
             for i in range(n):
                 if i in rules.consider:
                     K[i] = mpmath.mpf(0)
                 elif rules.limit is not None:
+                    limited = limited or abs(K[i]) > to_mpf(rules.limit)
                     K[i] = min(max(K[i], -to_mpf(rules.limit)), to_mpf(rules.limit))
             row = self.inverse[k, :] - h * M
             M = M + K * row
             rest = mpmath.eye(n) - K * h
             P = rest * P * rest.T + r * K * K.T
-            scalars.append(Scalar([to_fraction(row[i]) for i in range(m)], to_fraction(s)))
+            scalars.append(Scalar([to_fraction(row[i]) for i in range(m)], to_fraction(s), limited))
         return M, P, scalars
 
 

@@ -24,10 +24,10 @@ from kfgen.filters.frame import guards
 from kfgen.filters.frame.shared import shared
 from kfgen.filters.kinds.single import LONG_FUNCTIONS, SingleFilter
 from kfgen.filters.steps import process
-from kfgen.filters.steps.gate import gate, smallest, store_outcome
+from kfgen.filters.steps.gate import gate, store_outcome
 from kfgen.filters.steps.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.steps.process import Step
-from kfgen.filters.steps.state import StateCode
+from kfgen.filters.steps.state import NIS, StateCode
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
@@ -46,7 +46,7 @@ class Imm:
         # what is to stay above 0 must not become 0 by the rounding of mu
         self.floor = max(bank.mu_floor, scalar.probability) if bank.mu_floor > 0 else bank.mu_floor
         self.lively = bank.lively(scalar.smallest, scalar.probability)
-        self.modes = [Mode(name, f, f.own_blocks()) for name, f in zip(bank.names, filters, strict=True)]
+        self.modes = [Mode(name, f, (*f.own_blocks(), NIS)) for name, f in zip(bank.names, filters, strict=True)]
         forms = [f.form for f in filters]
         self.mixers = [form.mixer(forms) for form in forms]
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
@@ -154,6 +154,7 @@ class Imm:
         x = self.combined(t, made, mu)
         self._store(t, runs, x, mu)
         process.store_time(t, self.model, step)
+        guards.settled(t, self.model)
         names = taken | {a.name for a in arguments}
         return Function("predict", arguments, schedule(t, names), predict_doc(self.model))
 
@@ -218,17 +219,19 @@ class Imm:
         """Each mode updated; mu_j <- mu_j exp(l_j), normalised."""
         t = BankTrace(self.scalar.smallest)
         sensors = [self._sensor(mode, k) for mode in self.modes]
-        arguments, used = begin_update(t, [mode.model for mode in self.modes], sensors, partial)
+        models = [mode.model.of(sensor) for mode, sensor in zip(self.modes, sensors, strict=True)]
+        arguments, used = begin_update(t, models, sensors, partial)
         self.state.initialize(t, sensors[0], used)
         scopes = [mode.scope() for mode in self.modes]
         runs: list[tuple[Scope, Phases]] = []
         first: list[Judged | Made] = []
         for mode, scope, sensor in zip(self.modes, scopes, sensors, strict=True):
-            runs.append((scope, mode.filter.updating(t, sensor, used)))
+            runs.append((scope, mode.filter.of(sensor).updating(t, sensor, used)))
             first.append(_advance(t, *runs[-1]))
         t.settle()
         judged = [phase.nis for phase in first if phase.nis is not None]
-        gate(t, self.model, sensors, judged, used)
+        fields = [mode.path("nis") for mode in self.modes]
+        gate(t, self.model, sensors, judged, used, fields)
         made: list[Made] = []
         for run, phase in zip(runs, first, strict=True):
             while isinstance(phase, Judged):
@@ -236,9 +239,9 @@ class Imm:
             made.append(phase)
         t.settle()
         mu, log_likelihood = self.weighed(t, made)
-        x = self.combined(t, made, mu)
-        self._store(t, runs, x, mu)
-        store_outcome(t, self.model, sensors, smallest(t, judged), log_likelihood)
+        self._store(t, runs, self.combined(t, made, mu), mu)
+        store_outcome(t, self.model, sensors, judged, log_likelihood, fields)
+        guards.settled(t, self.model)
         name, doc = update_name(sensors[0], partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
 

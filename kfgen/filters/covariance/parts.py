@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
+from operator import or_
 from typing import Any, Protocol, TypeVar
 
 from kfgen.filters.algebra.linalg import Vector
@@ -22,7 +24,7 @@ Place = Callable[[Trace], Callable[[Value], Value]]
 
 @dataclass(frozen=True)
 class GainChange:
-    """What `consider` and `gain_limit` make of a gain. considered: inner positions."""
+    """What `consider` and `gain_limit` make of a gain; a limit that is met is flagged. considered: inner positions."""
 
     considered: frozenset[int]
     limit: Fraction | None
@@ -32,6 +34,9 @@ class GainChange:
         limit = self.limit
         if limit is None:
             return K
+        beyond = [(k > limit) | (k < -limit) for k in K if not is_zero(k)]
+        if beyond:
+            beyond[0].trace.flag(reduce(or_, beyond), "REGULARIZED")
         return [k if is_zero(k) else select(k > limit, limit, select(k < -limit, -limit, k)) for k in K]
 
 

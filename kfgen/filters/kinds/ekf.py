@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any
 
 from kfgen.filters.algebra.linalg import Vector, dot, plus
-from kfgen.filters.algebra.numbers import is_positive, require_nonnegative
+from kfgen.filters.algebra.numbers import assume_positive, is_positive, positive_within, require_nonnegative
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.noise import Additive, Given
@@ -94,8 +94,9 @@ class Ekf(SingleFilter):
         moved = {i for i, (value, before) in enumerate(zip(x, prior.x, strict=True)) if value.node is not before.node}
         t.section("guards")
         values = [v for rows in (F, result.Q) for row in rows for v in row]
-        guards.doubts(t, [*result.x, *values, *(d for _, d in noise)])
-        guards.finite(t, [x[i] for i in sorted(moved)] + evidence)
+        values += [v for w, d in noise for v in (*w, d)]
+        guards.doubts(t, [*result.x, *values])
+        guards.finite(t, [x[i] for i in sorted(moved)] + evidence, values)
         yield Made(x, P)
         self.store(t, x, moved if t.in_place else set(range(len(x))), P, after_predict=True)
         self.compensation.store(t, rests, free, x)
@@ -132,14 +133,14 @@ class Ekf(SingleFilter):
             guards.doubts(t, [*self._model_values(innovation), *u.tested])
             # nis shows whether z is finite, but for components that may have been skipped
             skippable = [v for v, r in zip(innovation.y, innovation.variances, strict=True) if not is_positive(r)]
-            guards.finite(t, [*skippable, *x, result.nis, *evidence, *u.tested])
+            guards.finite(t, [*skippable, *x, result.nis, *evidence, *u.tested], self._entering(innovation, result))
             guards.positive(t, result.failures)
         elif final is result:
             yield from self.judged(u, innovation, result)
             guards.finite(t, [result.nis, *x, *evidence])
         else:
             guards.doubts(t, x)
-            guards.finite(t, [result.nis, *x, *final.s, *evidence])
+            guards.finite(t, [result.nis, *x, *final.s, *evidence], [final.log_likelihood])
             guards.positive(t, final.failures)
         kept = self.prepared(u, x, P, final.motion)
         yield Made(x, P, result.nis, final.log_likelihood)
@@ -162,12 +163,18 @@ class Ekf(SingleFilter):
         if u.used is not None:
             own = masked(u.t, linear, linear.R, u.used)[1]
             linear, R = masked(u.t, linear, R, u.used)
-            if linear.computed and any(r.constant is None for row in linear.R for r in row):
+            if u.adapted is None and linear.computed and any(r.constant is None for row in linear.R for r in row):
                 Given(own).factors()  # what was added might hide that R is no covariance
         innovation = decorrelated(u.t, linear, R, u.used, smallest)
         for r in innovation.variances:
             require_nonnegative(r, "a measurement variance is negative")
+            self.suppose(r)
         return innovation
+
+    def suppose(self, r: Value) -> None:
+        """Take a variance for positive that is not 0 within the declared ranges: 0 is then no case of its own."""
+        if self.scalar.uniform and not is_positive(r) and positive_within(r, process.declared_signs(self.model)):
+            assume_positive(r)
 
     def spread(self, u: Update, linear: Linearised) -> Symmetric:
         """H P H^T."""
@@ -197,7 +204,7 @@ class Ekf(SingleFilter):
         t = u.t
         t.section("guards")
         guards.doubts(t, [*self._model_values(innovation), *u.tested])
-        guards.finite(t, [*innovation.y, *plain.s, *u.tested])
+        guards.finite(t, [*innovation.y, *u.tested], self._entering(innovation, plain))
         guards.positive(t, plain.failures)
         yield Judged(plain.nis)
 
@@ -229,6 +236,10 @@ class Ekf(SingleFilter):
     def residual_after(self, u: Update, x: list[Value], P: Any) -> Vector:
         """z - h at the new x."""
         return u.code.residual(x)
+
+    def _entering(self, innovation: Innovation, result: Updated[Any]) -> list[Value]:
+        """What enters the estimate: innovation variances, and through them R and H."""
+        return [*result.s, *self._model_values(innovation)]
 
     def _model_values(self, innovation: Innovation) -> list[Value]:
         values = [v for row in innovation.rows for v in row if isinstance(v, Value)]

@@ -59,7 +59,7 @@ class Ekf2(Ekf):
         predicted = [d.value + m for d, m in zip(linear.predicted, terms.mean, strict=True)]
         m = len(predicted)
         added = [[linear.added[i][j] + u.t.value(terms.spread[i][j]) for j in range(m)] for i in range(m)]
-        if u.used is None and any(r.constant is None for row in linear.R for r in row):
+        if u.used is None and u.adapted is None and any(r.constant is None for row in linear.R for r in row):
             Given(linear.R).factors()  # tested before the rest comes in
         return replace(linear, y=u.code.residuals(u.x, predicted), added=added, computed=True)
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 from kfgen.filters.base import Block, FilterCode
 from kfgen.filters.covariance.base import Form
+from kfgen.filters.frame import guards
 from kfgen.filters.frame.runs import put
 from kfgen.filters.steps import process
 from kfgen.filters.steps.adapt import AdaptedQ, AdaptedR
@@ -142,10 +144,19 @@ class SingleFilter(ABC):
         options = [key for key in ("robust", "adaptive", "adapt_R", "adapt_Q") if getattr(spec, key) is not None]
         return f"{title}, {self.form.title} covariance{form}" + "".join(f", {key}" for key in options)
 
+    def of(self, sensor: SensorModel) -> Self:
+        """The filter with the options of one sensor, for its updates."""
+        if sensor.options is None:
+            return self
+        other = copy(self)
+        other.model = self.model.of(sensor)
+        return other
+
     def adapted_R(self, sensor: SensorModel) -> AdaptedR | None:
-        if self.model.options.adapt_R is None:
+        model = self.model.of(sensor)
+        if model.options.adapt_R is None:
             return None
-        return AdaptedR(self.model, sensor, self.form.factored, self.scalar.epsilon)
+        return AdaptedR(model, sensor, self.form.factored, self.scalar.epsilon)
 
     # functions
 
@@ -156,22 +167,24 @@ class SingleFilter(ABC):
         for _ in self.predicting(t, step):
             pass
         process.store_time(t, self.model, step)
+        guards.settled(t, self.model)
         names = taken | {a.name for a in arguments}
         return Function("predict", arguments, schedule(t, names), predict_doc(self.model))
 
     def update(self, sensor: SensorModel, taken: frozenset[str], partial: bool = False) -> Function:
         """The update with the whole vector z of a sensor, or with the components that a mask selects."""
         model, t = self.model, Trace(self.scalar.smallest)
-        arguments, used = begin_update(t, [model], [sensor], partial)
+        arguments, used = begin_update(t, [model.of(sensor)], [sensor], partial)
         self.state.initialize(t, sensor, used)
-        for phase in self.updating(t, sensor, used):
+        for phase in self.of(sensor).updating(t, sensor, used):
             if isinstance(phase, Judged):
                 gate(t, model, [sensor], [phase.nis], used)
             else:
                 made = phase
         assert made.nis is not None
         assert made.log_likelihood is not None
-        store_outcome(t, model, [sensor], made.nis, made.log_likelihood)
+        store_outcome(t, model, [sensor], [made.nis], made.log_likelihood)
+        guards.settled(t, model)
         name, doc = update_name(sensor, partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
 

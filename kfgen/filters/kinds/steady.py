@@ -11,7 +11,7 @@ from kfgen.filters.algebra.riccati import Gain, Rules, Scalar, steady
 from kfgen.filters.base import CONST_KF, INPUTS, KF, FilterCode, sensor_argument
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
-from kfgen.filters.steps.gate import gate, store_outcome
+from kfgen.filters.steps.gate import gate, store_outcome, tested
 from kfgen.filters.steps.sensor import SensorCode, needs_inputs, total
 from kfgen.filters.steps.state import StateCode
 from kfgen.ir.program import Argument, Function
@@ -64,7 +64,7 @@ class Steady:
         arguments: list[Argument] = [KF]
         if model.inputs:
             arguments.append(INPUTS)
-            guards.inputs(t, model.inputs)
+        guards.arguments(t)
         step = process.step_length(t, model)
         prior = process.given(t, model, step)
         t.section("model")
@@ -78,6 +78,7 @@ class Steady:
         for i in moved:
             t.store("kf.x", i, x[i])
         process.store_time(t, model, step)
+        guards.settled(t, model)
         return Function("predict", arguments, schedule(t, taken | {"u"}), "Advance the estimate by one step.")
 
     def update(self, sensor: SensorModel, gain: Gain, taken: frozenset[str]) -> Function:
@@ -86,7 +87,8 @@ class Steady:
         arguments: list[Argument] = [KF, sensor_argument(sensor.name)]
         if needs_inputs(model, sensor):
             arguments.append(INPUTS)
-            guards.inputs(t, model.inputs)
+        guards.arguments(t)
+        tested(t, model, [sensor])
         self.state.initialize(t, sensor, None)
         t.section("innovation")
         code = SensorCode(t, model, sensor, list(range(self.n)))
@@ -114,7 +116,8 @@ class Steady:
             if value.node is not prior[i].node:
                 t.store("kf.x", i, value)
         squares, logs = self._likelihood(t, gain.made, y)
-        store_outcome(t, model, [sensor], nis, (squares + logs) * Fraction(-1, 2))
+        store_outcome(t, model, [sensor], [nis], (squares + logs) * Fraction(-1, 2))
+        guards.settled(t, model)
         doc = f"Take a measurement of {sensor.name} into account."
         return Function(f"update_{sensor.name}", arguments, schedule(t, taken | {"z", "u"}), doc)
 

@@ -266,7 +266,7 @@ class Seeing:
         t = u.t
         linear = replace(u.code.linearise(u.x), y=u.code.residuals(u.x, seen.z), H=H)
         if self.carried:
-            if u.used is None and any(r.constant is None for row in total(linear) for r in row):
+            if u.used is None and u.adapted is None and any(r.constant is None for row in total(linear) for r in row):
                 Given(total(linear)).factors()  # tested before the rest comes in
             V, C = udu(self.noise_covariance(u))
             none: Vector = [t.zero] * self.q

@@ -125,7 +125,7 @@ class Ukf(Ekf):
 
     @property
     def indexed(self) -> bool:
-        return self.loops and not self.simple
+        return self.form.indexed if self.simple else self.loops
 
     def predicting(self, t: Trace, step: Step) -> Phases:
         """Points through f; x <- their mean, P <- their spread + Q + G Qw G^T of the noises that they do not carry."""

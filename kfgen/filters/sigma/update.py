@@ -14,6 +14,7 @@ from typing import Any
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.linalg import Rows, Vector, times
 from kfgen.filters.algebra.numbers import (
+    Number,
     assume_nonnegative,
     assume_positive,
     is_positive,
@@ -30,7 +31,7 @@ from kfgen.filters.kinds.ekf import Ekf, Update
 from kfgen.filters.sigma.seeing import Seeing, Seen
 from kfgen.filters.steps.gate import chi2_threshold
 from kfgen.filters.steps.phases import Judged, Made, Phases
-from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated
+from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated, masked
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model.model import SensorModel
 from kfgen.quantiles import log_two_pi
@@ -111,7 +112,7 @@ def whole_vector(
     t.section("guards")
     sound = [*work.y(seen), *first.D, *u.tested, *(v for row in work.R for v in row)]
     guards.finite(t, [*sound, nis] if sensor.gate is None else sound)
-    guards.doubts(t, [v for row in linear.R for v in row])
+    guards.doubts(t, [v for row in work.R for v in row])
     guards.positive(t, [*failures, *first.failures])
     yield Judged(nis)
     P = u.P
@@ -138,11 +139,11 @@ def whole_vector(
         likelihood = likelihood + (term if counts is None else t.select(counts, term, 0))
     t.section("state")
     x = ukf.moved(u, motion)
-    evidence = ukf.unconfined(x) + form.evidence(P, after_predict=False)
+    evidence = ukf.unconfined(x) + form.evidence(P, after_predict=final is not first)
     P = ukf.limited(t, P)
     x = ukf.state.confined(t, x)
     t.section("guards")
-    guards.finite(t, [nis, *x, *evidence])
+    guards.finite(t, [nis, *x, *evidence], [] if final is first else [*final.D, likelihood])
     if not work.definite:
         P, indefinite = form.indefinite(P, seeing.n * ukf.scalar.epsilon)
         failed += indefinite
@@ -160,15 +161,18 @@ class _Whole:
         self.ukf = ukf
         self.u = u
         self.seeing = seeing
+        self.H = linear.H
         m = seeing.m
         R: Rows = linear.R
         if u.adapted is not None:
             adapted = u.adapted.adapted(u.t, seen.spread, u.used)
             R = [[adapted[i, j] for j in range(m)] for i in range(m)]
-        self.R: Rows = [[R[i][j] + linear.added[i][j] for j in range(m)] for i in range(m)]
+        R = [[R[i][j] + linear.added[i][j] for j in range(m)] for i in range(m)]
+        self.R: Rows = R if u.used is None else masked(u.t, linear, R, u.used)[1]
         if u.adapted is None and any(r.constant is None for row in self.R for r in row):
             for d in decorrelated(u.t, linear, self.R).variances:
                 require_nonnegative(d, "R is not positive semidefinite")
+                ukf.suppose(d)
         diagonal = all(is_zero(self.R[i][j]) for i in range(m) for j in range(m) if i != j)
         self.definite = seeing.points.positive and seeing.points.exact
         self.sure = diagonal and all(is_positive(self.R[i][i]) for i in range(m)) and self.definite
@@ -192,7 +196,6 @@ class _Whole:
         t, used, m = self.u.t, self.u.used, self.seeing.m
         spread, R, cross = self.spread(seen), self.R, seen.cross
         if used is not None:
-            R = [[select(used[i] & used[j], R[i][j], t.one if i == j else t.zero) for j in range(m)] for i in range(m)]
             cross = [[c if is_zero(c) else select(b, c, t.zero) for b, c in zip(used, row, strict=True)]
                      for row in cross]  # fmt: skip
         S = [[spread[i][j] + R[i][j] for j in range(m)] for i in range(m)]
@@ -207,8 +210,18 @@ class _Whole:
         epsilon = self.ukf.scalar.epsilon
         # points differ from each other by the rounding of what h is made of, if by nothing else
         total = sum(abs(w) for w in self.seeing.points.wc) * (32 * epsilon) ** 2
-        noise: Vector = [0 if self.sure or self.seeing.linear else z * z * total for z in seen.z]
+        noise: Vector = [0 if self.sure else z * z * total for z in seen.z]
+        if self.seeing.linear and not self.sure:
+            noise = [self._left(h) for h in self.H]
         return factored(t, names, self.y(seen), S, cross, self.sure, 8 * epsilon, noise)
+
+    def _left(self, h: Vector) -> Number:
+        """What rounding may leave of h P h^T where h x is known exactly."""
+        places = [i for i, a in enumerate(h) if not is_zero(a)]
+        if len(places) < 2:
+            return 0
+        P, n = self.ukf.form.entries(self.u.P), self.seeing.n
+        return sum(P[i, i] * (h[i] * h[i]) for i in places) * (8 * n * self.ukf.scalar.epsilon)
 
     def inflated(
         self, seen: Seen, first: Factored, array: Array | None, out: Array | None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from kfgen.filters.algebra.dual import Dual, Evaluator
 from kfgen.filters.algebra.factors import udu_computed
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_nonnegative, assume_positive, is_zero, select
@@ -14,15 +15,19 @@ from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.kept import Kept
 from kfgen.filters.covariance.noise import Additive, Computed, Factored
-from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
 
 
-def _constants(matrix: tuple[tuple[object, ...], ...]) -> list[list[Fraction]]:
-    lowering = Lowering(Trace(), {})
-    values = [[lowering(e).constant for e in row] for row in matrix]
+def _constants(model: Model, matrix: tuple[tuple[object, ...], ...]) -> list[list[Fraction]]:
+    """Numbers, parameters being at the spec's values."""
+    t = Trace()
+    given = {name: Dual(t.value(value)) for name, value in model.parameters}
+    if model.dt is not None:
+        given["dt"] = Dual(t.value(model.dt))
+    evaluator = Evaluator(t, model, given)
+    values = [[evaluator.value(e).constant for e in row] for row in matrix]
     return [[Fraction(0) if v is None else v for v in row] for row in values]
 
 
@@ -35,7 +40,8 @@ class AdaptedR:
         self.m = len(sensor.h)
         self.residual_field = f"residual_{sensor.name}"
         names = [c.name for c in sensor.spec.components]
-        self.kept = Kept(f"R_{sensor.name}", _constants(sensor.R), factored, f"R of {sensor.name}, adapted", names)
+        start, doc = _constants(model, sensor.R), f"R of {sensor.name}, adapted"
+        self.kept = Kept(f"R_{sensor.name}", start, factored, doc, names)
         self.smallest = self.m * epsilon
         self.next: Symmetric | None = None
 
@@ -87,7 +93,7 @@ class AdaptedQ:
     def __init__(self, model: Model, order: list[int], factored: bool, epsilon: Fraction) -> None:
         assert model.options.adapt_Q is not None
         self.rate = model.options.adapt_Q
-        Q = _constants(model.Q)
+        Q = _constants(model, model.Q)
         doc, names = "additive process noise, adapted", [model.states[i] for i in order]
         self.kept = Kept("Q", [[Q[i][j] for j in order] for i in order], factored, doc, names)
         self.smallest = len(order) * epsilon

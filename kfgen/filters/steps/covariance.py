@@ -113,7 +113,7 @@ class CovarianceCode:
             jj = upper_start(j)
             scale = t.name(P[jj + j] * tolerance, "round_off")
             pivot = t.name(W[jj + j], "pivot")
-            t.guard(pivot < -scale, "NOT_POSITIVE")
+            t.guard(~(pivot >= -scale), "NOT_POSITIVE")
             d = t.name(select(pivot > scale, pivot, 0), "d")
             W[jj + j] = d
             with t.loop("i", 0, j, down=True) as i:  # what is above i in column j is still P's

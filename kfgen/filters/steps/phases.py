@@ -13,6 +13,8 @@ from typing import Any
 from kfgen.filters.base import DT, INPUTS, KF, MASK, sensor_argument
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
+from kfgen.filters.steps.gate import tested
+from kfgen.filters.steps.needed import needed
 from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.sensor import needs_inputs
 from kfgen.ir.program import Argument
@@ -47,8 +49,7 @@ def begin_predict(t: Trace, model: Model) -> tuple[list[Argument], Step]:
     arguments: list[Argument] = [KF]
     if model.inputs:
         arguments.append(INPUTS)
-        t.section("arguments")
-        guards.inputs(t, model.inputs)
+    guards.arguments(t)
     if model.dt is None and model.spec.dt is not None:
         arguments.append(DT)
     return arguments, process.step_length(t, model)
@@ -76,7 +77,8 @@ def begin_update(
         t.guard(~some, "OK")
     if any(needs_inputs(model, sensor) for model, sensor in zip(models, sensors, strict=True)):
         arguments.append(INPUTS)
-        guards.inputs(t, models[0].inputs)
+    guards.arguments(t, needed(models, sensors, used))
+    tested(t, models[0], sensors)
     if partial:
         arguments.append(MASK)
     return arguments, used

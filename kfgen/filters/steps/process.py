@@ -13,6 +13,7 @@ from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_positive, is_zero, require_nonnegative
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
+from kfgen.spec import constants
 
 NEGATIVE = "a noise variance is negative"
 
@@ -85,6 +86,20 @@ def parameters_and_inputs(t: Trace, model: Model, inputs: bool = True) -> dict[s
     if inputs:
         out.update({name: Dual(t.field(f"u.{name}")) for name in model.inputs})
     return out
+
+
+def declared_signs(model: Model) -> dict[str, int]:
+    """The signs of inputs and parameters whose declared range excludes 0, by their paths."""
+    found: dict[str, int] = {}
+    spec = model.spec
+    given = [(f"u.{i.name}", i.range) for i in spec.inputs]
+    given += [(f"kf.parameters.{p.name}", p.range) for p in spec.parameters]
+    for path, limits in given:
+        if limits is not None:
+            low, high = (float(constants.value(limit.tree, spec)) for limit in limits)
+            if low > 0 or high < 0:
+                found[path] = 1 if low > 0 else -1
+    return found
 
 
 def time_now(t: Trace, model: Model) -> Dual:

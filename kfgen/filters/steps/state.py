@@ -14,6 +14,8 @@ from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
 
+NIS = Block("nis", None, "normalised innovation squared of the last update")
+
 
 def counts_gated(model: Model, sensors: Sequence[SensorModel]) -> bool:
     """Whether the filter counts a sensor's rejections: where it is asked to, or has to.
@@ -51,7 +53,7 @@ class StateCode:
         x0 = tuple(part.placed(v) for v, part in zip(model.x0, model.parts, strict=True))
         out = [Block("x", self.n, "state", initial=x0)]
         out += self.covariance
-        out.append(Block("nis", None, "normalised innovation squared of the last update"))
+        out.append(NIS)
         for every in self.sensors:
             if counts_gated(model, every):
                 doc = f"measurements of {every[0].name} refused in a row"

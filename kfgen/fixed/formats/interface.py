@@ -49,6 +49,7 @@ class Interface:
         one = -f.bits
         for b, mode in enumerate(self.code.modes):
             f.fixed[f.arrays.element(("array", "kf.mu"), b)] = one
+            f.fixed["number", f"kf.modes.{mode.name}.nis"] = one
             for i in range(n):
                 f.fixed[f.arrays.element(("array", f"kf.modes.{mode.name}.x"), i)] = x[i]
         for name in ("nis", "log_likelihood"):

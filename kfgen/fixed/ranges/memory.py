@@ -31,6 +31,6 @@ def blank(code: FilterCode) -> Memory:
     for f in code.functions:
         for a in f.arguments:
             if a.size is not None and not f.private:
-                # functions may share a name: get_R_<sensor> of sensors of different sizes
-                memory.arrays[a.name] = [0.0] * max(a.size, n, len(memory.arrays.get(a.name, ())))
+                size = max(a.size, n, len(memory.arrays.get(a.name, ())))  # that of the largest sensor
+                memory.arrays[a.name] = [0.0] * size
     return memory

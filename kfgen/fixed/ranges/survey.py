@@ -23,7 +23,7 @@ def survey(runner: Runner, weather: Weather, log: Log | None, linear: bool) -> P
     if log is not None:
         runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
     pace = _nominal(runner, weather, LONG if linear else STEPS)
-    if runner.code.model.options.inflation is not None:
+    if any(options.inflation is not None for options in runner.code.model.every_options):
         runner.limits = [INFLATED * variance for variance in pace.typical()]
     for seed, (gain, outliers, correlation, every) in enumerate(RUNS, 2):
         columns, rows = weather.log(STEPS, Random(seed, gain), Random(100 + seed, gain, outliers))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from kfgen.spec.builders.filter import FilterBuilder
 from kfgen.spec.builders.values import Values
 from kfgen.spec.raw import Fields, Word, entries, limits, matrix
 from kfgen.spec.tree import names
@@ -121,14 +122,35 @@ class ModelBuilder:
             matrix(f.get("R")),
             noise,
             matrix(f.get("noise_covariance")),
-            Gate(self.values.formula(gate, "probability"), self.values.number(gate.get("reset_after")))
-            if isinstance(gate, Fields)
-            else None,
+            self.gate(gate) if isinstance(gate, Fields) else None,
             f.get("partial", False),
             f.get("rate"),
+            self.own(f),
             f.get("doc", ""),
             f.place,
         )
+
+    def own(self, f: Fields) -> dict[str, Any]:
+        """The options of the filter that a sensor has of its own."""
+        options = FilterBuilder(self.values)
+        found: dict[str, Any] = {}
+        if "robust" in f:
+            found["robust"] = options.robust(f)
+        if "adaptive" in f:
+            found["adaptive"] = options.adaptive(f)
+        if "adapt_R" in f:
+            rate = f.get("adapt_R")
+            found["adapt_R"] = None if rate is None or rate.text == "none" else rate
+        return found
+
+    def gate(self, f: Fields) -> Gate:
+        given = [key for key in ("probability", "threshold") if key in f]
+        if len(given) == 2:
+            text = "`probability` and `threshold` are given both"
+            self.problems.add(f.places["threshold"], text, "remove one of them")
+        elif not given and not f.bad:
+            self.problems.add(f.place, "`probability` or `threshold` is missing", "write `probability: 0.999`")
+        return Gate(f.get("probability"), f.get("threshold"), self.values.number(f.get("reset_after")))
 
     def component(self, name: str, f: Fields, covered: bool, noisy: bool) -> Component:
         kind, period = self.values.kind(f)

@@ -9,6 +9,7 @@ from kfgen.spec.problems import short
 from kfgen.spec.raw import BAD
 from kfgen.spec.rules.facts import Facts, Model
 from kfgen.spec.rules.points import check_points
+from kfgen.spec.sensors import filter_of
 from kfgen.spec.tree import Expression
 from kfgen.spec.types import Filter, Sensor
 
@@ -24,8 +25,9 @@ def check(facts: Facts) -> None:
             _linear(facts, model)
         if chosen.gain == "steady" and facts.spec.imm is None:
             _steady(facts, model)
-        if chosen.adapt_R is not None:
-            for sensor in model.measurements:
+        for sensor in model.measurements:
+            _own(facts, chosen, sensor)
+            if filter_of(chosen, sensor).adapt_R is not None:
                 _constant_R(facts, model, sensor)
         if chosen.adapt_Q is not None:
             _constant(facts, model, _entries(model.dynamics.Q), "adapt_Q", "Q")
@@ -64,6 +66,22 @@ def _excluded(facts: Facts, chosen: Filter) -> None:
     if points is not None and points.kind == "cubature" and chosen.reject is not None:
         text = "`reject` does not go with cubature: it has no centre point to replace others by"
         facts.add(_place(chosen, "reject"), text, "choose other sigma points, or remove `reject`")
+
+
+def _own(facts: Facts, chosen: Filter, sensor: Sensor) -> None:
+    """What a sensor asks for in place of the filter's options."""
+    for key, option in sensor.own.items():
+        if option is None:
+            continue
+        at = facts.at(f"{sensor.place.path}.{key}", otherwise=sensor.place)
+        if chosen.type == "iekf":
+            text = f"`{key}` does not go with an iekf: it is defined per scalar measurement"
+            facts.add(at, text, "remove one of the two")
+        elif key == "robust" and chosen.type == "ukf" and not chosen.sequential:
+            text = "`robust` does not go with a whole-vector ukf: it is defined per scalar measurement"
+            facts.add(at, text, "write `covariance: ud` and `sequential: true`")
+        elif chosen.gain == "steady":
+            facts.add(at, f"`{key}` does not go with `gain: steady`: it makes the gain vary", "remove one of the two")
 
 
 def _consider(facts: Facts, model: Model) -> None:
@@ -182,10 +200,13 @@ def _measurement_noise(sensor: Sensor) -> list[Expression]:
     return found + _entries(sensor.R) + _entries(sensor.noise_covariance)
 
 
-def _constant(facts: Facts, model: Model, entries: list[Expression], key: str, what: str) -> None:
-    """One mistake per matrix, at the first entry that varies."""
+def _constant(
+    facts: Facts, model: Model, entries: list[Expression], key: str, what: str, allowed: str = ""
+) -> None:
+    """One mistake per matrix, at the first entry that varies. allowed: a kind of name that may."""
     for entry in entries:
-        varying = _varying(model, model.context.uses(entry))
+        uses = frozenset(name for name in model.context.uses(entry) if model.context.kinds.get(name) != allowed)
+        varying = _varying(model, uses)
         if varying:
             facts.add(entry.place, f"{what} varies with {varying}, but `{key}` wants it constant", "use constants")
             return
@@ -193,4 +214,4 @@ def _constant(facts: Facts, model: Model, entries: list[Expression], key: str, w
 
 def _constant_R(facts: Facts, model: Model, sensor: Sensor) -> None:
     entries = [c.variance for c in sensor.components if c.variance is not None] + _entries(sensor.R)
-    _constant(facts, model, entries, "adapt_R", f"R of {short(sensor.name)}")
+    _constant(facts, model, entries, "adapt_R", f"R of {short(sensor.name)}", "parameter")

@@ -10,6 +10,7 @@ from kfgen.spec.constants import NotConstant, truth, value
 from kfgen.spec.expressions import MAX_EXPONENT
 from kfgen.spec.operations import NoValue, Value, apply, less
 from kfgen.spec.rules.facts import Facts, Model, show
+from kfgen.spec.sensors import filter_of
 from kfgen.spec.tree import Call, Name, Number, Tree
 from kfgen.spec.types import Filter, Range, Sensor
 
@@ -181,15 +182,23 @@ def _sensor(facts: Facts, sensor: Sensor) -> None:
     facts.check_range(sensor.rate, "the rate", 0)
     if sensor.gate is not None:
         facts.check_range(sensor.gate.probability, "the probability", 0, 1)
+        facts.check_range(sensor.gate.threshold, "the threshold", 0)
+    if sensor.own:
+        _update(facts, filter_of(Filter(), sensor))
 
 
-def _filter(facts: Facts, chosen: Filter) -> None:
+def _update(facts: Facts, chosen: Filter) -> None:
+    """The options that a sensor may have of its own."""
     if chosen.adaptive is not None:
         facts.check_range(chosen.adaptive.probability, "the probability", 0, 1)
         facts.check_range(chosen.adaptive.chi2, "the threshold", 0)
     if chosen.robust is not None:
         facts.check_range(chosen.robust.k, "`k`", 0)
     facts.check_range(chosen.adapt_R, "a forgetting factor", 0, 1)
+
+
+def _filter(facts: Facts, chosen: Filter) -> None:
+    _update(facts, chosen)
     facts.check_range(chosen.adapt_Q, "a forgetting factor", 0, 1)
     facts.check_range(chosen.innovation_floor, "the smallest innovation variance", 0)
     facts.check_range(chosen.gain_limit, "the largest gain", 0)

@@ -164,6 +164,10 @@ def changed_gain(t: Trace, change: GainChange, gain: Array, difference: Array | 
         k = t.name(gain[i], "k_i")
         new = k
         if limit is not None:
+            beyond = (k > limit) | (k < -limit)
+            for place in sorted(change.considered):
+                beyond = beyond & ((i < place) | (i > place))
+            t.flag(beyond, "REGULARIZED")
             new = t.name(select(k > limit, limit, select(k < -limit, -limit, k)), "k_limited")
             gain[i] = new
         if difference is not None:

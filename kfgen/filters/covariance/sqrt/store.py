@@ -64,8 +64,11 @@ class SqrtStore:
 
     def _set_root(self, taken: frozenset[str], outdated: str) -> Function:
         t, n = Trace(), self.n
-        with t.loop("i", 0, n) as i, t.loop("j", 0, i + 1) as j:
-            t.guard(~t.finite(t.element("S", i * n + j)), "NOT_FINITE")
+        with t.loop("i", 0, n) as i:
+            variance = t.variable("variance", 0)
+            with t.loop("j", 0, i + 1) as j:
+                variance.set(variance.get() + t.element("S", i * n + j) * t.element("S", i * n + j))
+            t.guard(~t.finite(variance.get()), "NOT_FINITE")
         t.section("columns may change their sign: the diagonal is kept positive")
         with t.loop("i", 0, n) as i, t.loop("j", 0, i + 1) as j:
             value = t.name(t.element("S", i * n + j), "value")
