@@ -24,6 +24,7 @@ from tests.campaign.oracle_points import oracle
 
 STEPS = 25
 TOLERANCE = 1e-9
+EPS = float(np.finfo(float).eps)
 SINGULAR = 1e-6  # of sigma points, where a pivot of P may be rounding alone
 FIXED_X, FIXED_P = 0.1, 0.2  # sigma, and relative to the variance
 
@@ -142,8 +143,10 @@ def _differs(
         d[i] = min(d[i], abs(d[i] - period))
     if not np.all(d <= tolerance * (largest + np.sqrt(top))):
         return "x"
+    # what an update takes from a large P_ii is lost to rounding in what it leaves
     floor = np.maximum(np.diag(other_P), 1e-6 * top)
-    if not np.all(np.abs(P - other_P) <= tolerance * np.sqrt(np.outer(floor, floor)) + 1e-30):
+    lost = 16 * len(x) * EPS * float(np.max(top / np.maximum(np.diag(other_P), EPS * top + 1e-300)))
+    if not np.all(np.abs(P - other_P) <= max(tolerance, lost) * np.sqrt(np.outer(floor, floor)) + 1e-30):
         return "P"
     return ""
 
