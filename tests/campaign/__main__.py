@@ -13,7 +13,7 @@ from pathlib import Path
 # matrices are small: a pool of threads in each process only makes them wait for each other
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from tests.campaign.batch import Work, class_of, work
+from tests.campaign.batch import Work, class_of, quiet, work
 from tests.campaign.state import Result, State
 
 KEPT = 2  # failures of a kind and class that are minimised and kept
@@ -41,7 +41,7 @@ class Campaign:
 
     def run(self) -> None:
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(self.jobs, mp_context=context) as pool:
+        with ProcessPoolExecutor(self.jobs, mp_context=context, initializer=quiet) as pool:
             running: dict[Future[Result], int] = {}
             try:
                 while not self.over() or running:
@@ -53,7 +53,8 @@ class Campaign:
                         del running[future]
                         self.take(future)
             except KeyboardInterrupt:  # what is still at work is done again by the next run
-                pool.shutdown(wait=False, cancel_futures=True)
+                for process in list(pool._processes.values()):
+                    process.terminate()
                 raise
 
     def take(self, future: Future[Result]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import signal
+import sys
 import tempfile
 import time
 import traceback
@@ -61,6 +62,12 @@ def _limited(seconds: int) -> Iterator[None]:
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
+
+
+def quiet() -> None:
+    """A worker leaves Ctrl-C to its parent, and clears up when that ends it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
 
 
 def spec_of(seed: int) -> Data:
@@ -143,7 +150,10 @@ def _called(
             small, calls, place = data, "", ""
             if segment == first:  # the rest of what a spec shows is likely to have the same cause
                 small = minimised(data, partial(_fails, kind, how, first), _left(how))
-                calls, place = _trace(small, how, kind)
+                if small is data:
+                    calls = run(program, index, segment, 1, 5.0, trace=True).text
+                else:
+                    calls, place = _trace(small, how, kind, first)
             result.failures.append(Failure(kind, seed, small, place or f"segment {segment}, call {call}", calls))
     counts.update(_compared([(data, g) for g, data in made.values()], how, seen, result, kinds, folder))
 
@@ -169,12 +179,12 @@ def _fails(kind: str, how: Work, segment: int, data: Data) -> bool:
     return kind in {found for found, *_ in told.failures}
 
 
-def _trace(data: Data, how: Work, kind: str) -> tuple[str, str]:
+def _trace(data: Data, how: Work, kind: str, first: int) -> tuple[str, str]:
     """The calls of the first segment that fails so."""
     generated = built(data)
     with tempfile.TemporaryDirectory(prefix="campaign-") as folder:
         program = compile_batch(Path(folder), {data["name"]: (generated, data)}, _mended({"": (generated, data)}, how))
-        told = run(program, 0, 0, EVERYTHING, 5.0)
+        told = run(program, 0, 0, 2 * first + 2000, 5.0)
         for found, _, segment, call in told.failures:
             if found == kind:
                 return run(program, 0, segment, 1, 5.0, trace=True).text, f"segment {segment}, call {call}"

@@ -189,7 +189,8 @@ def _fields(name: str, text: str) -> list[Data]:
         real = kind.cname in ("float", "double", "int32_t") and "parameters" not in path
         leaf = path.rpartition(".")[2]
         finite = real and re.fullmatch(r"(x|U|D|P|S)\[0\]", leaf) is not None
-        found.append({"path": path, "leaf": leaf, "size": size, "real": real, "finite": finite})
+        square = "(double)v * (double)v" if leaf == "S[0]" else "fabs((double)v)"
+        found.append({"square": square, "path": path, "leaf": leaf, "size": size, "real": real, "finite": finite})
 
     walk(ffi.typeof(f"{name}_t"), "")
     return found

@@ -56,7 +56,7 @@ def candidates(data: Data) -> Iterator[Data]:
         for key in ("kind", "bounds"):
             if key in entry:
                 yield _without(data, "states", state, key)
-    for state, expression in data["dynamics"]["f"].items():
+    for state, expression in data.get("dynamics", {}).get("f", {}).items():
         for shorter in _shorter(expression):
             yield _with(data, shorter, "dynamics", "f", state)
     for sensor, entry in data["measurements"].items():
@@ -65,7 +65,7 @@ def candidates(data: Data) -> Iterator[Data]:
                 yield _with(data, shorter, "measurements", sensor, "z", component, "h")
     if isinstance(data.get("dt"), dict):
         yield _with(data, data["dt"]["nominal"], "dt")
-    if data["dynamics"].get("form") == "continuous" and not any(
+    if data.get("dynamics", {}).get("form") == "continuous" and not any(
         "density" in str(w) for w in data.get("noise", {}).values()
     ):
         yield _with(data, {"f": data["dynamics"]["f"], "Q": data["dynamics"].get("Q", {})}, "dynamics")

@@ -29,7 +29,7 @@ def mutant(seed: int) -> Data:
     """An example after up to four changes."""
     dice = random.Random(seed)
     data = copy.deepcopy(dice.choice(examples()))
-    data["name"] = f"s{seed}"
+    data |= {"name": f"s{seed}", "filter": data.get("filter", {"type": "ekf"})}
     for _ in range(dice.choice((0, 1, 2, 3, 4))):
         dice.choice(CHANGES)(data, dice)
     # whether Q and R stay covariances whatever their parameters are is not known of what others wrote

@@ -59,7 +59,7 @@ class Model:
         dt = data.get("dt", 1.0)
         self.nominal = float(dt["nominal"] if isinstance(dt, dict) else dt)
         self.periods = [period(state) for state in data["states"].values()]
-        self.dynamics = data["dynamics"]
+        self.dynamics = data.get("dynamics", {})
         self.continuous = self.dynamics.get("form") == "continuous"
 
     def names(self, x: Any, u: Any = (), dt: Any = None, t: float = 0.0, **others: Any) -> Names:
@@ -100,7 +100,7 @@ class Model:
 
     def advance(self, x: list[Any], w: list[Any], u: Array, dt: float, t: float) -> list[Any]:
         """The step of f with states and noises of any kind of number."""
-        f = self.dynamics["f"]
+        f = self.dynamics.get("f", {})
 
         def rate(x: list[Any]) -> list[Any]:
             names = self.names(x, u, dt, t, **dict(zip(self.noises, w, strict=True)))
@@ -139,7 +139,9 @@ class Model:
         if self.dense:
             once = Model({**self.data, "dynamics": {**self.dynamics, "form": "discrete"}})
             rates = once.advance(joint[: self.n], joint[self.n :], u, dt, t)
-            listed = [rate if s in self.dynamics["f"] else 0.0 for s, rate in zip(self.states, rates, strict=True)]
+            listed = [
+                rate if s in self.dynamics.get("f", {}) else 0.0 for s, rate in zip(self.states, rates, strict=True)
+            ]
             G = localised(listed, k, Qw, Qw).J[:, self.n :]
             local.added = G @ Qc @ G.T * dt
         return local
@@ -149,7 +151,7 @@ class Model:
         n, k = self.n, len(joint)
         once = Model({**self.data, "dynamics": {**self.dynamics, "form": "discrete"}})
         rates = once.advance(joint[:n], joint[n:], u, dt, t)
-        rates = [rate if s in self.dynamics["f"] else 0.0 for s, rate in zip(self.states, rates, strict=True)]
+        rates = [rate if s in self.dynamics.get("f", {}) else 0.0 for s, rate in zip(self.states, rates, strict=True)]
         local = localised(rates, k, Qw, Qw)
         A, B, x = local.J[:, :n], local.J[:, n:], np.array([j.v for j in joint[:n]])
         c = local.value - A @ x

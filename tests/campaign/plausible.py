@@ -69,10 +69,10 @@ def limits(data: Data) -> list[tuple[int, str, str]]:
     made = []
     for i, name in enumerate(data["states"]):
         ends = []
-        for key, default in (("variance_floor", -1.0), ("variance_ceiling", 1e300)):
+        for key, default in (("variance_floor", -1.0), ("variance_ceiling", float("inf"))):
             value = options.get(key)
             value = value.get(name) if isinstance(value, dict) else value
-            ends.append(repr(number(value, default)))
+            ends.append(repr(number(value, default)).replace("inf", "(double)INFINITY"))
         made.append((i, *ends))
     return made
 

@@ -34,6 +34,21 @@ CASES = {
 }  # fmt: skip
 
 
+BENT = """
+kfgen: 1
+name: bent
+scalar: double
+dt: 0.1
+states: {a: {init: 1, std: 1}, b: {init: 0.3, std: 1}}
+covariances: [[a, b, 0.5]]
+dynamics: {f: {a: 0.5*a + 0.1*b}, Q: {a: 0.2, b: 0.2}}
+measurements:
+  angle: {z: {z: {h: 0.5*sin(a) - 2*a, std: 0.1}}}
+filter: {type: ukf, covariance: full, adaptive: {chi2: 8}, adapt_R: 0.01}
+code: {unroll: none}
+"""
+
+
 def looped(text: str, form: str, options: str) -> Spec:
     spec = unscented(text, form, options)
     return replace(spec, code=replace(spec.code, unroll="none"))
@@ -86,3 +101,15 @@ def test_the_text_hardly_grows_with_the_states(options):
             assert any(isinstance(s, For) for s in walk(functions[name].body)), name
         lengths.append(made.files["ring.c"].count(";"))
     assert lengths[1] < 1.5 * lengths[0], lengths
+
+
+@pytest.mark.parametrize("z", [-2.0, 9.0])
+def test_what_an_update_takes_from_an_inflated_covariance_it_takes_once(z):
+    """adapt_R draws points from P after the update, before it is stored."""
+    spec = loads(BENT)
+    kf, ref = built({"": spec})[""], reference(spec)
+    for each in (kf, ref):
+        each.predict()
+        each.update("angle", [z])
+    np.testing.assert_allclose(kf.P, ref.P, rtol=1e-12)
+    np.testing.assert_allclose(kf.x, ref.x, rtol=1e-12)

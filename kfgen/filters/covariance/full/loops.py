@@ -100,7 +100,13 @@ class LoopedFull(Looped, FullStore):
     # sigma points -----------------------------------------------------------------------------------
 
     def root(self, t: Trace, P: ArrayEntries, tolerance: Fraction, stored: bool, in_loops: bool) -> Array:
-        return self.root_array(t, tolerance, None if stored else Array(t, P.written().array))
+        if stored:
+            return self.root_array(t, tolerance, None)
+        if P.terms and P.array:  # taken from the array itself, they would be taken again by who goes on with P
+            left = P.space.array("left", upper_size(self.n))
+            P.write(left.name, left.__setitem__)
+            return self.root_array(t, tolerance, left)
+        return self.root_array(t, tolerance, Array(t, P.written().array))
 
     def gatherer(
         self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
