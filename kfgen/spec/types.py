@@ -71,6 +71,7 @@ class Input:
     unit: str = ""
     range: Range | None = None
     doc: str = ""
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)
