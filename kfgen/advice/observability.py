@@ -38,20 +38,24 @@ def advice(spec: Spec, tracks: Sequence[Track]) -> Iterator[Advice]:
 def _unseen(tracks: Sequence[Track]) -> Array:
     """A basis (n, r) of the directions that leave no trace in any measurement of the track, in any mode."""
     stacked: list[Array] = []
+    bounds: list[Array] = []  # of the same with absolute terms: what round-off is measured by
     for track in tracks:
-        onward = np.eye(track.x.shape[1])
+        onward = absolute = np.eye(track.x.shape[1])
         for k in range(len(track.x)):
             for name, H in track.H.items():
                 size = np.sqrt(np.maximum(np.diag(track.R[name]), 0.0))
-                stacked.append((H[k] @ onward) / np.where(size > 0, size, 1.0)[:, None])
-            onward = track.F[k] @ onward
+                size = np.where(size > 0, size, 1.0)[:, None]
+                stacked.append(H[k] @ onward / size)
+                bounds.append(np.abs(H[k]) @ absolute / size)
+            onward, absolute = track.F[k] @ onward, np.abs(track.F[k]) @ absolute
             largest = np.abs(onward).max()
             if not np.isfinite(largest) or largest > 1e12:  # an unstable model: what is seen so far must do
                 break
-    rows = np.vstack(stacked)
-    rows = rows[np.isfinite(rows).all(axis=1)]
-    length = np.sqrt((rows**2).sum(axis=0))
-    seen = length > 1e-13 * max(float(length.max(initial=0.0)), 1e-300)
+    rows, limits = np.vstack(stacked), np.vstack(bounds)
+    finite = np.isfinite(limits).all(axis=1)
+    length, limit = (np.sqrt((each[finite] ** 2).sum(axis=0)) for each in (rows, limits))
+    rows = rows[finite]
+    seen = length > 1e-13 * limit
     n = len(length)
     _, values, right = np.linalg.svd(rows[:, seen] / length[seen])
     rank = int(np.count_nonzero(values > RANK * max(float(values.max(initial=0.0)), 1.0)))

@@ -28,7 +28,7 @@ from kfgen.spec.schema_model import (
 from kfgen.spec.shapes import Choice, Either, Formula, Items, Key, Record, Table, Text, Whole
 
 ADVICE = (
-    "alpha", "degrees", "far_origin", "init_bounds", "init_range", "loops", "no_process_noise", "precision",
+    "alpha", "degrees", "far_origin", "init_range", "loops", "no_process_noise", "precision",
     "sigma_angle", "std_variance", "ud_cost", "unobservable", "unused", "unused_noise",
 )  # fmt: skip
 """The names of all advice."""

@@ -81,7 +81,7 @@ def _names(formulas: Iterable[Expression], let: tuple[Definition, ...]) -> set[s
 
 def _driven(mode: Spec) -> bool:
     """Whether anything keeps the covariance from falling for ever."""
-    known = environment_of(mode)
+    known = environment_of(mode, folded=False)  # a parameter may be changed
 
     def some(formula: Expression | None) -> bool:
         if formula is None:
