@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from kfgen.generate import Generated
 
 FRACTION = 3  # full costs a third: it is worth saying
+MOST = 40  # states of a filter that is built in another form although loops are what it needs
 LARGE, TENTH = 32 * 1024, 10
-MANY = 1000  # operations of a ud filter from which the other form is built to be compared
 
 
 def cheaper(spec: Spec, generated: Generated) -> Iterator[Advice]:
@@ -22,9 +22,12 @@ def cheaper(spec: Spec, generated: Generated) -> Iterator[Advice]:
     prediction = generated.summary.prediction
     if generated.fixed is not None or prediction is None:
         return
-    flash = prediction.totals["flash"]
-    if flash > LARGE and spec.code.unroll == "auto" and not spec.code.unroll_by and spec.code.flash is None:
-        yield from _loops(spec, flash)
+    flash, code = prediction.totals["flash"], spec.code
+    undecided = code.unroll == "auto" and not code.unroll_by and code.flash is None
+    loops = list(_loops(spec, flash)) if flash > LARGE and undecided and "loops" not in spec.advice else []
+    yield from loops
+    if loops and len(spec.states) > MOST:
+        return  # which is the larger matter, and the other takes long to build
     if spec.imm is None and spec.filter.covariance == "ud" and spec.filter.type in ("kf", "ekf"):
         yield from _full(spec, generated)
 
@@ -39,7 +42,9 @@ def _loops(spec: Spec, flash: int) -> Iterator[Advice]:
 
 def _full(spec: Spec, generated: Generated) -> Iterator[Advice]:
     ours = _operations(generated)
-    if "ud_cost" in spec.advice or ours < MANY or any(form == "loops" for form in generated.summary.forms.values()):
+    if "ud_cost" in spec.advice or any(form == "loops" for form in generated.summary.forms.values()):
+        return
+    if _least(generated) * FRACTION > ours:  # then it need not be built to be compared
         return
     other = _built(replace(spec, filter=replace(spec.filter, covariance="full", update="joseph")))
     if other is None:
@@ -50,6 +55,14 @@ def _full(spec: Spec, generated: Generated) -> Iterator[Advice]:
         cure = "write `covariance: full` where R is not tiny beside P, and keep ud where it is"
         place = spec.filter.places.get("covariance", spec.filter.place)
         yield Advice(place if place.line else spec.place, text, cure, "ud_cost")
+
+
+def _least(generated: Generated) -> int:
+    """What a full covariance takes at least: F P with F as sparse as it is, and P - K H P of each component."""
+    model = generated.code.model
+    states, n = set(model.states), len(model.states)
+    beside = sum(len(model.uses(f) & states - {name}) for name, f in zip(model.states, model.f, strict=True))
+    return 2 * beside * n + 3 * sum(len(sensor.h) for sensor in model.sensors) * n * (n + 1) // 2
 
 
 def _operations(generated: Generated) -> int:

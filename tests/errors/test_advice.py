@@ -9,6 +9,8 @@ import pytest
 
 import kfgen
 from kfgen.advice import advise
+from kfgen.generate import build
+from kfgen.override import override
 from kfgen.spec import load, loads
 from kfgen.spec.schema import ADVICE
 from kfgen.spec.types import Spec
@@ -187,6 +189,37 @@ def test_modes_see_together() -> None:
     assert told(loads(bank + moving + rest)) == []
     blind = moving.replace("p: p + dt*v", "p: 0.9*p")
     assert [line.rpartition("[")[2] for line in told(loads(bank + blind + rest))] == ["unobservable]"]
+
+
+def test_what_full_costs_is_told_where_it_is_a_third() -> None:
+    """Both figures, and only where it is so: chain8 takes 1024 operations and 808."""
+    spec = load("tests/benchmarks/ins24.yaml")
+    spec = override(spec, filter={"covariance": "ud"})
+    lines = [str(each) for each in advise(spec, build(spec)) if each.name == "ud_cost"]
+    assert len(lines) == 1
+    found = re.search(r"`covariance: ud` takes (\d+) operations for one of each function, `full` (\d+)", lines[0])
+    assert found is not None
+    assert int(found[1]) >= 3 * int(found[2]) > 1000
+    assert lines[0].endswith("[ud_cost]")
+    full = override(spec, filter={"covariance": "full"})
+    assert [each for each in advise(full, build(full)) if each.name == "ud_cost"] == []
+    for text in (problems.chain(8), problems.ATT):
+        spec = override(loads(text), filter={"covariance": "ud"})
+        assert advise(spec, build(spec)) == []
+
+
+def test_loops_are_told_where_they_take_a_tenth() -> None:
+    spec = override(loads(problems.chain(24)), filter={"covariance": "ud"})
+    lines = [str(each) for each in advise(spec, build(spec)) if each.name == "loops"]
+    assert len(lines) == 1
+    found = re.search(r"about (\d+) bytes of straight-line code, of which loops need about (\d+)", lines[0])
+    assert found is not None
+    assert int(found[1]) > 32768
+    assert int(found[1]) > 10 * int(found[2])
+    assert lines[0].endswith("[loops]")
+    for code in ({"unroll": "full"}, {"unroll": "none"}, {"flash": 1 << 20}):
+        decided = override(spec, code=code)
+        assert [str(each) for each in advise(decided, build(decided)) if each.name == "loops"] == []
 
 
 def test_every_name_is_one_of_the_languages() -> None:
