@@ -12,7 +12,8 @@ from kfgen.spec.types import Spec
 if TYPE_CHECKING:
     from kfgen.generate import Generated
 
-FRACTION = 3  # full costs a third: it is worth saying
+FRACTION = 3  # a prediction of full costs a third: it is worth saying
+FEW = 1000  # operations that nobody minds
 MOST = 40  # states of a filter that is built in another form although loops are what it needs
 LARGE, TENTH = 32 * 1024, 10
 
@@ -41,32 +42,39 @@ def _loops(spec: Spec, flash: int) -> Iterator[Advice]:
 
 
 def _full(spec: Spec, generated: Generated) -> Iterator[Advice]:
-    ours = _operations(generated)
+    predict, ours = _operations(generated)
     if "ud_cost" in spec.advice or any(form == "loops" for form in generated.summary.forms.values()):
         return
-    if _least(generated) * FRACTION > ours:  # then it need not be built to be compared
+    if ours < FEW or _estimate(generated) * FRACTION > predict:  # then it need not be built to be compared
         return
-    other = _built(replace(spec, filter=replace(spec.filter, covariance="full", update="joseph")))
+    joseph = spec.filter.gain_limit is not None or spec.filter.consider
+    chosen = replace(spec.filter, covariance="full", update="joseph" if joseph else "standard")
+    other = _built(replace(spec, filter=chosen))
     if other is None:
         return
-    theirs = _operations(other)
-    if theirs * FRACTION <= ours:
-        text = f"`covariance: ud` takes {ours} operations for one of each function, `full` {theirs}"
-        cure = "write `covariance: full` where R is not tiny beside P, and keep ud where it is"
+    theirs, all_theirs = _operations(other)
+    if theirs * FRACTION <= predict and all_theirs * 2 <= ours:
+        text = (
+            f"a prediction with `covariance: ud` takes {predict} operations, with `full` {theirs}; with one of each "
+            f"update {ours} and {all_theirs}"
+        )
+        cure = f"write `covariance: full, update: {chosen.update}` where P does not dwarf R, and keep ud where it does"
         place = spec.filter.places.get("covariance", spec.filter.place)
         yield Advice(place if place.line else spec.place, text, cure, "ud_cost")
 
 
-def _least(generated: Generated) -> int:
-    """What a full covariance takes at least: F P with F as sparse as it is, and P - K H P of each component."""
+def _estimate(generated: Generated) -> int:
+    """What F P F^T takes, about, with F as sparse as it is."""
     model = generated.code.model
-    states, n = set(model.states), len(model.states)
+    states = set(model.states)
     beside = sum(len(model.uses(f) & states - {name}) for name, f in zip(model.states, model.f, strict=True))
-    return 2 * beside * n + 3 * sum(len(sensor.h) for sensor in model.sensors) * n * (n + 1) // 2
+    return 3 * beside * len(states)
 
 
-def _operations(generated: Generated) -> int:
-    return sum(sum(counts.values()) for name, counts in generated.summary.rows if not name.endswith("_masked"))
+def _operations(generated: Generated) -> tuple[int, int]:
+    """Of a prediction, and of one with one of each update."""
+    counts = {name: sum(each.values()) for name, each in generated.summary.rows if not name.endswith("_masked")}
+    return counts.get("predict", 0), sum(counts.values())
 
 
 def _built(spec: Spec) -> Generated | None:
