@@ -180,6 +180,14 @@ def test_no_advice_on_the_problems(text: str) -> None:
     assert told(loads(text)) == []
 
 
+SENSIBLE_FILES = sorted(Path(__file__).with_name("sensible").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", SENSIBLE_FILES, ids=lambda path: path.stem)
+def test_no_advice_on_what_engineers_write(path: Path) -> None:
+    assert told(load(path)) == []
+
+
 def test_modes_see_together() -> None:
     """What one mode does not use, another does."""
     bank = BASE.split("dynamics:")[0] + "measurements: {pos: {z: {p: {h: p, std: 0.3}}}}\nimm:\n  modes:\n"
