@@ -11,6 +11,8 @@ type can carry, so that what differs is the filters' own arithmetic.
   is allowed, if that is more. Once that departs by more than the tolerance, nothing is left to compare: such a row is
   counted, and all go on from the first reference.
 * The error of P_ij is relative to sqrt(P_ii P_jj), in fixed point less one LSB of P at the interface.
+* Where eight roundings of a float of x's size exceed a tenth of its standard deviation in most rows, what is compared
+  tells nothing of that state any more: the check fails, and says which.
 * A decision at a threshold (a gate, a robust weight) may fall differently by round-off. Such a difference is
   counted, and the compiled filter then goes on from the reference's estimate; more than 1 % of the calls, or
   any error bit that only one of the two returns, fails the check.
@@ -23,6 +25,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kfgen.advice.resolution import too_coarse, ulp
 from kfgen.geometry import part_of
 from kfgen.interface import Array, Filter
 from kfgen.native.run import Plan, plan
@@ -79,12 +82,13 @@ class Outcome:
     resolution: float  # what rounding x alone does to the reference, in sigma
     lost: int  # rows that could not be compared for it
     certificate: tuple[str, ...] = ()  # fixed point: operations proved to fit, guarded, at risk
+    coarse: tuple[str, ...] = ()  # states that a float of their size resolves too coarsely
 
     @property
     def passed(self) -> bool:
         few = len(self.differences) <= DIFFERENT_DECISIONS * self.calls
         close = self.x.error <= max(self.tolerance, 8 * self.resolution) and self.P.error <= self.tolerance
-        return close and few and not self.errors_differ
+        return close and few and not self.errors_differ and not self.coarse
 
 
 def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
@@ -122,6 +126,7 @@ def compare(
     differences: list[str] = []
     calls, lost, errors_differ = 0, 0, False
     tolerance = tolerance_of(spec.scalar)
+    grain = _Grain(list(kf.states)) if spec.scalar == FLOAT else None
     for row in range(steps):
         for call in _calls(spec, work, row, random):
             ours, theirs = _made(kf, call), _made(ref, call)
@@ -134,6 +139,8 @@ def compare(
                 differences.append(text)
                 errors_differ |= ours >= ERROR or theirs >= ERROR
                 _follow(ref, kf, coarse)
+        if grain is not None:
+            grain.see(ref.x, ref.P)
         departs = scales.x_errors(coarse.x, ref.x, ref.P)
         if coarse is not ref and not max(*departs, *scales.P_errors(coarse.P, ref.P)) <= tolerance:
             lost += 1
@@ -144,7 +151,7 @@ def compare(
         P.see(scales.P_errors(kf.P, ref.P), scales.pairs, row)
     return Outcome(
         kf.name, spec.scalar, steps, calls, x, P, tuple(differences), errors_differ, tolerance,
-        rounding.error, lost,
+        rounding.error, lost, coarse=grain.coarse() if grain is not None else (),
     )  # fmt: skip
 
 
@@ -207,6 +214,30 @@ def _rounded(kf: NativeFilter, work: Plan) -> Plan:
         work.mask,
         scalar.to_physical(scalar.to_raw(work.z, units.readings), units.readings),
     )
+
+
+class _Grain:
+    """What a float's resolution is against the standard deviations along the track."""
+
+    def __init__(self, names: list[str]) -> None:
+        self.names = names
+        self._x: list[Array] = []
+        self._sigma: list[Array] = []
+
+    def see(self, x: Array, P: Array) -> None:
+        self._x.append(x)
+        self._sigma.append(np.sqrt(np.maximum(np.diag(P), 0.0)))
+
+    def coarse(self) -> tuple[str, ...]:
+        """A sentence for each state that most rows resolve too coarsely."""
+        x, sigma = np.abs(self._x), np.array(self._sigma)
+        most = too_coarse(x, sigma).mean(axis=0) > 0.5
+        size, spread = np.median(x, axis=0), np.median(sigma, axis=0)
+        return tuple(
+            f"{self.names[i]}: float resolves {size[i]:.3g} to {ulp(size[i]):.2g}, beside a standard deviation of "
+            f"{spread[i]:.2g}: count it from a local origin, or write scalar: double"
+            for i in np.flatnonzero(most)
+        )
 
 
 class _Scales:

@@ -35,6 +35,21 @@ class Mistake:
         return text + self.message + (f"; {self.hint}" if self.hint else "")
 
 
+@dataclass(frozen=True, order=True)
+class Advice:
+    """What is allowed but probably not meant: where, what, a cure, and the name by which a spec silences it."""
+
+    place: Place
+    message: str
+    hint: str
+    name: str
+
+    def __str__(self) -> str:
+        place = self.place
+        at = f"{place.file}:{place.line}:{place.column}: warning: " + (f"{place.path}: " if place.path else "")
+        return f"{at}{self.message}; {self.hint} [{self.name}]"
+
+
 class KfgenError(Exception):
     """What kfgen tells its user without a traceback; the command line exits with status 2."""
 

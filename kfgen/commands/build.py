@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kfgen.commands.options import example, load_spec, scalar_option
+from kfgen.commands.options import example, load_spec, quiet_option, scalar_option, tell_advice
 from kfgen.commands.progress import progress
 from kfgen.commands.tables import Notes, Part, Paths, Table, show
 from kfgen.errors import KfgenError, Mistake, SpecError
@@ -63,6 +63,7 @@ class Built:
     help="A log whose ranges a fixed-point filter is to hold, beside those of simulated runs.",
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Also write over files that were edited by hand, or are not kfgen's.")
+@quiet_option
 @click.option(
     "--selftest", is_flag=True,
     help="Also write <name>_selftest.c, which replays a recorded run: <name>_selftest() is 0 where the filter works.",
@@ -80,6 +81,7 @@ def build(
     selftest: bool,
     layout: str,
     force: bool,
+    quiet: bool,
 ) -> None:
     """Write the C files of one or more specs to DIR/<name>/, and print what they take.
 
@@ -87,7 +89,9 @@ def build(
     was edited since it was written is refused. In the last line of each stands the hash of its body.
     """
     built = generate_all(specs, directory, scalar, selftest, layout, log)
-    _warn(built)
+    if not quiet:
+        for each in built:
+            tell_advice(each.spec, each.generated if not only_check else None)
     if only_check:
         sys.exit(1 if report_differences(built) else 0)
     from kfgen.files import write_all
@@ -167,15 +171,6 @@ def _read(log: Path | None, spec: Spec) -> Log | None:
     from kfgen.logs import read
 
     return read(log, spec)
-
-
-def _warn(built: Sequence[Built]) -> None:
-    """What a spec may hold, but probably does not mean, on stderr."""
-    from kfgen.spec import warnings
-
-    for each in built:
-        for warning in warnings(each.spec):
-            click.echo(f"warning: {warning}", err=True)
 
 
 def changed(files: Mapping[Path, str], force: bool) -> dict[Path, str]:

@@ -12,6 +12,7 @@ import click
 from kfgen.errors import KfgenError
 
 if TYPE_CHECKING:
+    from kfgen.generate import Generated
     from kfgen.spec.types import Spec
 
 spec_argument = click.argument("spec", type=click.Path(path_type=Path), metavar="SPEC")
@@ -20,6 +21,17 @@ scalar_option = click.option(
     metavar="S",
     help="float, double or q<m>.<n> (such as q16.16) in place of the spec's own scalar.",
 )
+
+
+quiet_option = click.option("--quiet", is_flag=True, help="No advice on what a spec may not mean.")
+
+
+def tell_advice(spec: Spec, generated: Generated | None = None) -> None:
+    """What a spec may hold, but probably does not mean, on stderr: a line each. generated: judge its costs too."""
+    from kfgen.advice import advise
+
+    for each in advise(spec, generated):
+        click.echo(str(each), err=True)
 
 
 def load_spec(path: Path, scalar: str | None = None) -> Spec:

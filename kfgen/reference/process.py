@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from kfgen.errors import SpecError
 from kfgen.reference.dual import Dual, Matrix, Number, Vector, hessian, jacobian, values, variables
@@ -263,3 +262,11 @@ _INTEGRATORS: dict[str, Callable[[Derivative, Numbers, float], Numbers]] = {
     "midpoint": _midpoint,
     "rk4": _rk4,
 }
+
+
+def expm(A: Matrix) -> Matrix:
+    """The exponential of a square matrix; of scipy, which takes long to load and is used by `exact` alone."""
+    from scipy.linalg import expm as exponential
+
+    result: Matrix = exponential(A)
+    return result

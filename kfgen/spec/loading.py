@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import replace
 from pathlib import Path
 
-from kfgen.errors import Mistake, Place, SpecError
+from kfgen.errors import Advice, Place, SpecError
 from kfgen.scalar_names import KNOWN, is_scalar
 from kfgen.spec.advice import warnings as _warnings
 from kfgen.spec.builders import Builder
@@ -84,6 +84,6 @@ def with_scalar(spec: Spec, scalar: str) -> Spec:
     return spec
 
 
-def warnings(spec: Spec) -> list[Mistake]:
-    """What is allowed but probably not meant."""
+def warnings(spec: Spec) -> list[Advice]:
+    """What is allowed but probably not meant, as far as the spec alone tells."""
     return _warnings(spec)

@@ -41,8 +41,10 @@ def is_semidefinite(rows: Rows) -> bool:
 
 
 def worst_pair(rows: Rows) -> tuple[int, int] | None:
-    """The pair whose correlation is farthest beyond 1, of a symmetric matrix; None where there is none, or a variance
-    is negative: then it takes more than two to break it."""
+    """The pair whose correlation is farthest beyond 1, of a symmetric matrix.
+
+    None where there is none, or a variance is negative: then it takes more than two to break it.
+    """
     with mpmath.workdps(_DIGITS):
         a = [[real(entry) for entry in row] for row in rows]
         if any(a[i][i] < 0 for i in range(len(a))):

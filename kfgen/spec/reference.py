@@ -6,7 +6,7 @@ from kfgen.spec.expressions import MAX_EXPONENT, MAX_LENGTH, MAX_NESTING, MAX_NO
 from kfgen.spec.guide import GUIDE
 from kfgen.spec.names import MAX_NAME
 from kfgen.spec.reader import MAX_BYTES, MAX_DEPTH
-from kfgen.spec.schema import RECORDS
+from kfgen.spec.schema import ADVICE, RECORDS
 from kfgen.spec.shapes import (
     SCOPE_WORDS,
     Budget,
@@ -120,6 +120,7 @@ def markdown() -> str:
     for record in RECORDS:
         _sections(record, parts, seen)
     parts.append(GUIDE)
+    parts.append(_advice())
     parts.append("## What is decided where the language leaves a choice")
     parts.append("\n".join(f"* {decision}" for decision in DECISIONS))
     return "\n\n".join(parts) + "\n"
@@ -161,8 +162,22 @@ def _names() -> str:
 Constants, parameters, states, inputs, noises and definitions share one name space with `dt` (the step in
 s) and `t` (seconds since init). Sensors, their components and modes have their own. A name is a C
 identifier of at most {MAX_NAME} characters without a leading underscore; it is no keyword of C, C++ or
-Python, no function of the language, not `pi`, `e`, `t` or `dt`, and no macro of C's headers or of
-Arduino. `name` is no standard header. Two identifiers of the emitted code may not be equal in upper case."""
+Python, no function of the language, not `pi`, `e`, `t` or `dt` (what stands in no expression may be called
+so: sensors, components, the filter), and no macro of C's headers or of Arduino. `name` is no standard
+header. Two identifiers of the emitted code may not be equal in upper case, but for types (`tank_t` beside
+the index `TANK_T`)."""
+
+
+def _advice() -> str:
+    rows = "\n".join(f"| `{name}` | {text} |" for name, text in ADVICE.items())
+    return f"""## Advice
+
+What is allowed but probably not meant is told by `kfgen build` and `check`, one line each on stderr; the exit status
+stays what it is. `--quiet` silences all, `advice: [name, ...]` at the top of a spec what it names.
+
+| name | told where |
+| --- | --- |
+{rows}"""
 
 
 def _scopes() -> str:

@@ -27,11 +27,22 @@ from kfgen.spec.schema_model import (
 )
 from kfgen.spec.shapes import Choice, Either, Formula, Items, Key, Record, Table, Text, Whole
 
-ADVICE = (
-    "alpha", "degrees", "far_origin", "init_bounds", "init_range", "loops", "no_process_noise", "precision",
-    "sigma_angle", "std_variance", "ud_cost", "unobservable", "unused", "unused_noise",
-)  # fmt: skip
-"""The names of all advice."""
+ADVICE = {
+    "unused": "nothing uses a constant, parameter, input or definition",
+    "unused_noise": "a noise input stands in no f, one of a sensor in no h",
+    "no_process_noise": "nothing acts on any state, so that P falls for ever",
+    "unobservable": "no sensor sees a state, or tells some apart: the model, linearised along a simulated track",
+    "init_range": "init lies outside the range, a parameter's value outside its own",
+    "degrees": "an angle, or what stands in a sine, is in degrees",
+    "std_variance": "a `std` looks like a variance (`sigma**2`, `var_x`), or a `var` like a deviation",
+    "precision": "P0 exceeds R by more than a float resolves, with `covariance: full`",
+    "far_origin": "8 roundings of a float of a state's size exceed a tenth of its sigma, or take its motion",
+    "sigma_angle": "sigma points lie more than half a turn from the mean of an angle",
+    "alpha": "alpha makes weights that the scalar cannot carry",
+    "ud_cost": "a prediction with `covariance: full` takes a third of the operations",
+    "loops": "more than 32 kB of straight-line code, of which loops take a tenth",
+}
+"""The names of all advice, and where it is given."""
 
 LET = Table("definition", Formula("f"), declares=True)
 MEASUREMENTS = Table("sensor", SENSOR, declares=True)
@@ -111,7 +122,7 @@ TOP = Record(
         Key("filter", FILTER, "What filter is built.", "an ekf with its defaults"),
         Key("fixed", FIXED, "Fixed-point choices; used with a q scalar only, allowed with any."),
         Key("code", CODE, "What the emitted code looks like, and what it may cost."),
-        Key("advice", Items(Choice(ADVICE), "names of advice"), "What `kfgen build` is not to advise."),
+        Key("advice", Items(Choice(tuple(ADVICE)), "names of advice"), "What `kfgen build` is not to advise."),
         Key("imm", IMM, "An interacting-multiple-model filter: several modes over the same states."),
     ),
 )

@@ -72,6 +72,7 @@ class Input:
     unit: str = ""
     range: Range | None = None
     doc: str = ""
+    place: Place = NOWHERE
 
 
 @dataclass(frozen=True)

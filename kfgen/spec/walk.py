@@ -277,10 +277,9 @@ class Walker:
         for key in shape.keys:
             if key.required and key.name not in fields:
                 where = path_text((*path, key.name))
-                if where in self.meant:
-                    continue
-                place = Place(self.problems.file, fields.place.line, fields.place.column, where)
-                self.problems.add(place, f"the key `{key.name}` is missing", missing_key_hint(key))
+                if where not in self.meant:
+                    place = Place(self.problems.file, fields.place.line, fields.place.column, where)
+                    self.problems.add(place, f"the key `{key.name}` is missing", missing_key_hint(key))
         return fields
 
     def unused(self, fields: Fields, shape: Record) -> None:

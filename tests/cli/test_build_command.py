@@ -107,11 +107,15 @@ def test_wrong_calls_exit_2(kfgen, folder, arguments, text):
     assert result.stdout == ""
 
 
-def test_warnings_of_a_spec_are_told_but_not_fatal(kfgen, monkeypatch):
-    monkeypatch.setattr("kfgen.spec.warnings", lambda spec: ["file:1:1: odd"])
-    result = kfgen("build", SPEC)
-    assert result.exit_code == 0
-    assert result.stderr == "warning: file:1:1: odd\n"
+def test_advice_is_told_but_not_fatal(kfgen):
+    told = "vehicle_small.yaml:4:20: warning: constants.spare: nothing uses the constant `spare`; use it, or remove it "
+    Path(SPEC).write_text(Path(SPEC).read_text().replace("{speed: 5}", "{spare: 1, speed: 5}"))
+    for call in (["build"], ["build", "--check"], ["check"]):
+        result = kfgen(*call, SPEC)
+        assert (result.exit_code, result.stderr) == (0, f"{told}[unused]\n")
+        assert kfgen(*call, SPEC, "--quiet").stderr == ""
+    Path(SPEC).write_text(Path(SPEC).read_text() + "advice: [unused]\n")
+    assert kfgen("build", SPEC).stderr == ""
 
 
 def test_the_language_page(kfgen):

@@ -2,9 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from kfgen.check import compare, tolerance_of
+from kfgen.check import check, compare, tolerance_of
 from kfgen.native import load_filters
 from kfgen.reference import reference
+from kfgen.spec import loads
 from tests.native.small import vehicle_small
 
 
@@ -35,3 +36,27 @@ def test_a_wrong_filter_fails(spec, files, right, wrong):
 
 def test_tolerances():
     assert tolerance_of("double") < tolerance_of("float") < tolerance_of("q16.16")
+
+
+FAR = """
+kfgen: 1
+name: far_origin
+dt: 0.01
+states: {x: {init: 4.2e6, std: 10}, v: {init: 15, std: 1}}
+dynamics: {f: {x: x + dt*v}, Q: {x: 1e-6, v: 1e-4}}
+measurements: {gnss: {z: {x: {h: x, std: 3}}}}
+filter: {type: kf}
+"""
+
+
+def test_a_state_that_float_cannot_resolve_fails():
+    """Half a unit in the last place at 4.2e6 is 0.25, a step 0.15: the comparison alone would pass."""
+    outcome = check(loads(FAR))
+    assert not outcome.passed
+    assert [text.partition(":")[0] for text in outcome.coarse] == ["x"]
+    assert "float resolves 4.2e+06 to 0.5" in outcome.coarse[0]
+    assert "local origin" in outcome.coarse[0]
+    for spec in (loads(FAR.replace("name: far", "scalar: double\nname: far")), loads(FAR.replace("4.2e6", "420"))):
+        outcome = check(spec)
+        assert outcome.passed
+        assert outcome.coarse == ()

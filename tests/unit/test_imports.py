@@ -43,19 +43,21 @@ ALLOWED = {
     "emit": {"errors", "filters", "ir", "scalars", "status"},
     "budgets": SPEC | {"filters", "ir", "scalars"},
     "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars", "seal"},
+    "advice": SPEC | {"generate", "reference", "simulate"},
     # the compiled filter, and what uses it
     "simulate": SPEC | {"geometry", "logs", "reference"},
     "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
-    "check": SPEC | {"generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
+    "check": SPEC
+    | {"advice", "generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
     "cost": SPEC | {"emit", "logs", "native", "status"},
     "selftest": SPEC
     | {"emit", "filters", "fixed", "generate", "geometry", "ir", "logs", "native", "reference", "scalars", "simulate"}
     | {"status"},
     "layouts": {"emit"},
     "commands": SPEC
-    | {"check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference", "seal"}
-    | {"selftest", "simulate", "status"},
+    | {"advice", "check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference"}
+    | {"seal", "selftest", "simulate", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
     "__main__": {"cli"},

@@ -96,7 +96,7 @@ class Builder:
 
     def inputs(self) -> tuple[Input, ...]:
         return tuple(
-            Input(name, f.get("unit", ""), limits(f, "range"), f.get("doc", ""))
+            Input(name, f.get("unit", ""), limits(f, "range"), f.get("doc", ""), f.place)
             for name, f in entries(self.top.get("inputs"))
         )
 

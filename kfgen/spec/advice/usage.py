@@ -1,0 +1,99 @@
+"""Advice on names: those that nothing uses, noises that do not act."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from kfgen.errors import Advice, Place
+from kfgen.spec.constants import NotConstant, environment_of, value
+from kfgen.spec.modes import mode_specs
+from kfgen.spec.operations import NoValue
+from kfgen.spec.problems import short
+from kfgen.spec.tree import Expression, names
+from kfgen.spec.types import Definition, Spec
+
+
+def advice(spec: Spec) -> Iterator[Advice]:
+    yield from _unused(spec)
+    for mode in mode_specs(spec):
+        yield from _noises(mode)
+        if not _driven(mode):
+            text = "no process noise acts on any state: the filter becomes sure of them, and deaf"
+            cure = "write what may disturb them, `Q: {...}` or `noise`; or keep it awake with `variance_floor`"
+            yield Advice(mode.dynamics.place, text, cure, "no_process_noise")
+
+
+def expressions(part: Any) -> Iterator[Expression]:
+    """Every formula in a part of a spec."""
+    if isinstance(part, Expression):
+        yield part
+    elif isinstance(part, Mapping):
+        for each in part.values():
+            yield from expressions(each)
+    elif isinstance(part, tuple):
+        for each in part:
+            yield from expressions(each)
+    elif is_dataclass(part):
+        for field in fields(part):
+            yield from expressions(getattr(part, field.name))
+
+
+def closure(used: Iterable[str], let: tuple[Definition, ...]) -> set[str]:
+    """Names, and those that they rest on through definitions."""
+    found = set(used)
+    for definition in reversed(let):  # each uses only those before it
+        if definition.name in found:
+            found |= set(names(definition.value.tree))
+    return found
+
+
+def _unused(spec: Spec) -> Iterator[Advice]:
+    used = {name for expression in expressions(spec) for name in names(expression.tree)}
+    modes = mode_specs(spec)
+    declared: list[tuple[str, str, Place]] = [("constant", c.name, c.value.place) for c in spec.constants]
+    declared += [("parameter", p.name, p.value.place) for p in spec.parameters]
+    declared += [("input", i.name, i.place) for i in spec.inputs]
+    declared += [("definition", d.name, d.value.place) for mode in modes for d in mode.let]
+    for kind, name, place in declared:
+        if name not in used:
+            yield Advice(place, f"nothing uses the {kind} {short(name)}", "use it, or remove it", "unused")
+
+
+def _noises(mode: Spec) -> Iterator[Advice]:
+    acting = _names(mode.dynamics.f.values(), mode.let)
+    for noise in mode.noise:
+        if noise.name not in acting:
+            text = f"the noise {short(noise.name)} does not stand in `dynamics.f`, so it does nothing"
+            yield Advice(noise.place, text, "write it into f, where it acts; or as a variance into Q", "unused_noise")
+    for sensor in mode.measurements:
+        seen = _names([component.h for component in sensor.components], mode.let)
+        for noise in sensor.noise:
+            if noise.name not in seen:
+                text = f"the noise {short(noise.name)} stands in no h of {short(sensor.name)}, so it does nothing"
+                yield Advice(noise.place, text, "write it into h, or as `std` of a component", "unused_noise")
+
+
+def _names(formulas: Iterable[Expression], let: tuple[Definition, ...]) -> set[str]:
+    return closure((name for formula in formulas for name in names(formula.tree)), let)
+
+
+def _driven(mode: Spec) -> bool:
+    """Whether anything keeps the covariance from falling for ever."""
+    known = environment_of(mode, folded=False)  # a parameter may be changed
+
+    def some(formula: Expression | None) -> bool:
+        if formula is None:
+            return True
+        try:
+            return bool(value(formula.tree, known) != 0)
+        except (NotConstant, NoValue):
+            return True  # it depends on what only the run knows
+
+    if mode.filter.variance_floor or mode.filter.adapt_Q is not None or mode.filter.adaptive is not None:
+        return True
+    acting = _names(mode.dynamics.f.values(), mode.let)
+    Q = mode.dynamics.Q
+    entries = Q.values() if isinstance(Q, Mapping) else [entry for row in Q for entry in row]
+    return any(map(some, entries)) or any(noise.name in acting and some(noise.variance) for noise in mode.noise)
