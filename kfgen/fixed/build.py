@@ -16,6 +16,8 @@ from kfgen.fixed.linear import linear
 from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
 from kfgen.fixed.program.unroll import unrolled
+from kfgen.fixed.ranges.drive import Drive
+from kfgen.fixed.ranges.intervals import Intervals, spread
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
 from kfgen.fixed.ranges.runs import Runner
@@ -24,6 +26,8 @@ from kfgen.fixed.ranges.weather import Weather
 from kfgen.fixed.trial.certificate import Certificate, certify, lines
 from kfgen.fixed.trial.judge import judge
 from kfgen.logs import Log
+
+WIDER = 2.0**6  # times what runs have met: an interval that is wider than that has overrated its value
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,13 @@ def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> Fixe
     functions = list(real.functions)
     arrays, ranges = find_arrays(functions), Ranges()
     program, weather, constant = RealProgram(functions, arrays, ranges), Weather(real), linear(real)
-    pace = survey(Runner(real, program, ranges), weather, log, constant)
+    runner = Runner(real, program, ranges)
+    drive = Drive(runner, weather)
+    pace = survey(runner, weather, drive, log, constant)
+    intervals = Intervals(real.model, weather.box, ranges)
+    if weather.box.wide:
+        intervals.read(functions)
+        spread(intervals, WIDER)
     formats = choose(real, arrays, ranges, scalar.bits, constant, weather.process_noise(), pace)
     lowered = lower(real, formats)
     found = judge(program, real, lowered, formats, scalar, weather)

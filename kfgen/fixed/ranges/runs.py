@@ -70,13 +70,36 @@ class Runner:
                 continue
             for place, sensor in enumerate(self.spec.measurements):
                 if (k + place) % every == 0:
-                    self._limited(memory, sensor, log, k)
+                    self._limited(memory, sensor, readings(log, sensor, k), k)
             if every > 1 and rows - 2 * OUTAGE < 2 * k <= rows:
                 found = self._variances(memory)
                 least = [min(pair) for pair in zip(least or found, found, strict=True)]
             if k % EVERY == 0 or k == rows - 1:
                 self._others(memory, k)
         return memory
+
+    def row(self, memory: Memory, inputs: Mapping[str, float], dt: float, readings: Mapping[str, Sequence[float]],
+            k: int) -> None:  # fmt: skip
+        """A prediction, and the update of every sensor. inputs, readings: by name. k: the row's number."""
+        for name, value in inputs.items():
+            memory.numbers[f"u.{name}"] = value
+            self.ranges.see(("number", f"u.{name}"), value)
+        if self.run_time:
+            memory.numbers["dt"] = dt
+            self.ranges.see(("number", "dt"), dt)
+        self.program.run("predict", memory)
+        self._look(memory)
+        for sensor in self.spec.measurements:
+            if sensor.name in readings:
+                self._limited(memory, sensor, readings[sensor.name], k)
+        if k % EVERY == 0:
+            self._others(memory, k)
+
+    def place(self, memory: Memory, x: Sequence[float]) -> None:
+        """Put the estimate to x (n)."""
+        memory.arrays["x"] = list(x)
+        self.program.run("set_state", memory)
+        self._look(memory)
 
     def _correlate(self, memory: Memory, correlation: float) -> None:
         if "set_covariance" not in self.names:
@@ -93,12 +116,12 @@ class Runner:
         self.program.run("set_covariance", memory)
         self._look(memory)
 
-    def _limited(self, memory: Memory, sensor: Sensor, log: Columns, k: int) -> None:
+    def _limited(self, memory: Memory, sensor: Sensor, values: Sequence[float], k: int) -> None:
         if not self.limits:
-            self._update(memory, sensor, log, k)
+            self._update(memory, sensor, values, k)
             return
         before, seen = memory.copy(), self.ranges.copy()
-        self._update(memory, sensor, log, k)
+        self._update(memory, sensor, values, k)
         if any(new > limit for new, limit in zip(self._variances(memory), self.limits, strict=True)):
             self.ranges.restore(seen)
             memory.arrays, memory.numbers = before.arrays, before.numbers
@@ -135,8 +158,7 @@ class Runner:
         self.ranges.see(("number", "dt"), step)
         return step != 0
 
-    def _update(self, memory: Memory, sensor: Sensor, log: Columns, k: int) -> None:
-        values = readings(log, sensor, k)
+    def _update(self, memory: Memory, sensor: Sensor, values: Sequence[float], k: int) -> None:
         there = [not math.isnan(v) for v in values]
         if not any(there):
             return
