@@ -8,7 +8,7 @@ from kfgen.fixed.arithmetic.limits import BITS, LIMIT
 from kfgen.fixed.arithmetic.rounding import nearest, size_of
 from kfgen.fixed.lowering.raw import QTable, Raw
 from kfgen.fixed.lowering.sums import Sums
-from kfgen.fixed.program.nodes import make, same, terms
+from kfgen.fixed.program.nodes import integer, make, same, terms
 from kfgen.ir.nodes import Node
 
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
@@ -65,7 +65,8 @@ class Functions(Sums):
             out = max(out, -29)
             return Raw(make("q_atan2", (a.node, b.node), (-out,)), out)
         if op == "pow":
-            return Raw(make("q_pow", (a.node, b.node), (-a.e, -b.e, -out)), out)
+            # the routine's order: each number is followed by its fraction bits
+            return Raw(make("q_pow", (a.node, integer(-a.e), b.node, integer(-b.e)), (-out,)), out)
         raise NotImplementedError(op)
 
     def root(self, node: Node, e: int | None) -> Raw:

@@ -129,9 +129,18 @@ class Drive:
             seen = runner.ranges.copy()
             inputs = self._inputs(leg, row, random)
             dt = self._dt(leg, row, random)
-            truth.memory.numbers.update({f"u.{name}": value for name, value in inputs.items()})
-            if not truth.step(mode, dt, random):
+            start = list(truth.x)
+            if not self._stepped(mode, inputs, dt, random):
                 return before
+            if any(truth.cut) and inputs:  # the other way round it may stay within
+                leg.places = {name: 1.0 - p if name.startswith("u.") else p for name, p in leg.places.items()}
+                inputs = self._inputs(leg, row, random)
+                truth.place(start, [0.0] * truth.n)
+                if not self._stepped(mode, inputs, dt, random):
+                    return before
+            if any(truth.cut):  # and the estimate with it
+                x = [a - c for a, c in zip(memory.arrays["kf.x"], truth.cut, strict=True)]
+                runner.place(memory, [self.weather.box.inside(i, a) for i, a in enumerate(x)])
             self._noise()
             readings = {s.name: self._reading(mode, i, random) for i, s in enumerate(self.model.sensors)}
             if leg.dark and row >= rows // 2 and row < rows - 2:
@@ -143,6 +152,11 @@ class Drive:
                 return before
             self._note(leg, inputs, dt)
         return memory
+
+    def _stepped(self, mode: int, inputs: dict[str, float], dt: float, random: Random) -> bool:
+        """A step of the truth; False where it leaves the numbers."""
+        self.truth.memory.numbers.update({f"u.{name}": value for name, value in inputs.items()})
+        return self.truth.step(mode, dt, random)
 
     def _within(self, memory: Memory) -> bool:
         """Whether the estimate is not far outside of the box."""

@@ -40,6 +40,8 @@ class Truth:
         self.last = [0.0] * self.n**2  # Q of the last step
         self.memory = Memory()
         self.now = 0.0
+        self.parts = model.parts
+        self.cut = [0.0] * self.n  # by how much the last step would have left the box
 
     def _step(self, model: Model, b: int) -> Function:
         t, n = Trace(), self.n
@@ -82,10 +84,10 @@ class Truth:
 
     def place(self, x: Sequence[float], noise: Sequence[float]) -> None:
         """Put the truth at x + noise, both (n), or as near to it as the box allows."""
-        self.memory.arrays["kf.x"] = [
-            part.placed(a + e if part.flat is False else self.box.inside(i, a + e))
-            for i, (a, e, part) in enumerate(zip(x, noise, self.model.parts, strict=True))
-        ]
+        wanted = [a + e for a, e in zip(x, noise, strict=True)]
+        inside = [self.box.inside(i, a) if part.flat else a for i, (a, part) in enumerate(zip(wanted, self.parts, strict=True))]
+        self.cut = [a - b for a, b in zip(wanted, inside, strict=True)]
+        self.memory.arrays["kf.x"] = [part.placed(a) for a, part in zip(inside, self.parts, strict=True)]
 
     def step(self, mode: int, dt: float, random: Random) -> bool:
         """One step; False where the model leaves the numbers, and the truth stays where it is."""
