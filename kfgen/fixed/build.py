@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from kfgen.emit.fixed_point import FixedPoint
+from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic import tables
 from kfgen.fixed.arithmetic.routines import closure
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.formats.choose import choose
 from kfgen.fixed.formats.formats import Formats
-from kfgen.fixed.formats.report import table, units
+from kfgen.fixed.formats.report import periods, table, units
 from kfgen.fixed.linear import linear
 from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
@@ -20,14 +22,19 @@ from kfgen.fixed.ranges.drive import Drive
 from kfgen.fixed.ranges.intervals import Intervals, spread
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
+from kfgen.fixed.ranges.recorder import Recorder, unknown
 from kfgen.fixed.ranges.runs import Runner
 from kfgen.fixed.ranges.survey import survey
 from kfgen.fixed.ranges.weather import Weather
 from kfgen.fixed.trial.certificate import Certificate, certify, lines
-from kfgen.fixed.trial.judge import judge
+from kfgen.fixed.trial.integers import IntegerProgram
+from kfgen.fixed.trial.judge import hear, judge, refuse
+from kfgen.fixed.trial.tour import Tour
 from kfgen.logs import Log
 
 WIDER = 2.0**6  # times what runs have met: an interval that is wider than that has overrated its value
+DRIVEN, TRIED = 21, 31  # seeds of the runs over the box
+LEGS, ROWS = 8, 12  # of the trial
 
 
 @dataclass(frozen=True)
@@ -47,20 +54,82 @@ class FixedFilter:
 
 def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> FixedFilter:
     """Scale and lower a filter. log: runs beside the simulated ones. Raises SpecError where ranges do not fit."""
-    real = replace(code, functions=tuple(unrolled(f, code.constants) for f in code.functions))
-    functions = list(real.functions)
-    arrays, ranges = find_arrays(functions), Ranges()
-    program, weather, constant = RealProgram(functions, arrays, ranges), Weather(real), linear(real)
-    runner = Runner(real, program, ranges)
-    drive = Drive(runner, weather)
-    pace = survey(runner, weather, drive, log, constant)
-    intervals = Intervals(real.model, weather.box, ranges)
-    if weather.box.wide:
-        intervals.read(functions)
+    return _Builder(code, scalar, log).build()
+
+
+@dataclass(frozen=True)
+class _Lowered:
+    """Integers, their formats, and a program that runs them."""
+
+    code: FilterCode
+    formats: Formats
+    program: IntegerProgram
+
+
+class _Builder:
+    """Tries formats for the whole box first, then for less of it."""
+
+    def __init__(self, code: FilterCode, scalar: Fixed, log: Log | None) -> None:
+        self.scalar = scalar
+        self.real = replace(code, functions=tuple(unrolled(f, code.constants) for f in code.functions))
+        self.functions = list(self.real.functions)
+        self.arrays, self.ranges = find_arrays(self.functions), Ranges()
+        self.program = RealProgram(self.functions, self.arrays, self.ranges)
+        self.weather = Weather(self.real)
+        self.box = self.weather.box
+        self.drive = Drive(self.weather, self.box)
+        self.linear = linear(self.real)
+        self.runner = Runner(self.real, self.program, self.ranges)
+        self.pace = survey(self.runner, self.weather, log, self.linear)
+        self.met = self.ranges.copy()
+
+    def build(self) -> FixedFilter:
+        if not self.box.wide:
+            found = self._lowered()
+            self._judged(found)
+            return self._filter(found)
+        refusals: list[SpecError] = []
+        for limits in ((), unknown(self.box)):
+            self.ranges.restore(self.met)
+            self._drive(limits)
+            try:
+                return self._toured(limits)
+            except SpecError as error:
+                refusals.append(error)
+        raise refusals[0]
+
+    def _drive(self, limits: Sequence[float]) -> None:
+        """Runs over the box, and what intervals say of it."""
+        self.drive.run(Recorder(self.runner, self.box, limits), DRIVEN)
+        intervals = Intervals(self.real.model, self.box, self.ranges)
+        intervals.read(self.functions)
         spread(intervals, WIDER)
-    formats = choose(real, arrays, ranges, scalar.bits, constant, weather.process_noise(), pace)
-    lowered = lower(real, formats)
-    found = judge(program, real, lowered, formats, scalar, weather)
-    view = FixedPoint(scalar.bits, units(lowered, formats), table(formats), scalar.rounding == "floor", closure,
-                      tables)  # fmt: skip
-    return FixedFilter(lowered, real, formats, certify(lowered.functions, found.peaks), view)
+
+    def _toured(self, limits: Sequence[float]) -> FixedFilter:
+        """A filter that has been tried all over the box; what its trial has met counts where something saturated."""
+        for last in (False, True):
+            found = self._lowered()
+            self._judged(found)
+            tour = Tour(self.program, found.program, self.real, found.formats, found.code, self.box, limits)
+            self.drive.run(tour, TRIED, LEGS, ROWS)
+            if last or not tour.found.saturated:
+                break
+        refuse(tour.found, self.real, found.formats, self.scalar)
+        return self._filter(found)
+
+    def _lowered(self) -> _Lowered:
+        hear(self.real.model.spec, self.runner.heard)
+        noise = self.weather.process_noise()
+        formats = choose(self.real, self.arrays, self.ranges, self.scalar.bits, self.linear, noise, self.pace)
+        code = lower(self.real, formats)
+        return _Lowered(code, formats, IntegerProgram(list(code.functions), self.arrays, self.scalar))
+
+    def _judged(self, found: _Lowered) -> None:
+        judge(self.program, self.real, found.program, found.code, found.formats, self.scalar, self.weather)
+
+    def _filter(self, found: _Lowered) -> FixedFilter:
+        """What is handed on."""
+        view = FixedPoint(self.scalar.bits, units(found.code, found.formats), table(found.formats),
+                          self.scalar.rounding == "floor", closure, tables, periods(self.real.model))  # fmt: skip
+        certificates = certify(found.code.functions, found.program.peaks)
+        return FixedFilter(found.code, self.real, found.formats, certificates, view)

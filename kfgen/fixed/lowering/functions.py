@@ -11,6 +11,7 @@ from kfgen.fixed.lowering.sums import Sums
 from kfgen.fixed.program.nodes import integer, make, same, terms
 from kfgen.ir.nodes import Node
 
+COARSEST = 8  # bits of half a period, at least
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
 
 
@@ -38,7 +39,9 @@ class Functions(Sums):
                 return Raw(make("q_sign", (a.node,)), 0, -1, 1)
             case "wrap":
                 a = self.value(node.args[0])
-                a = self.at(a, max(a.e, size_of(node.data / 2) - 30))  # half a period, to 32 bits more, is an int64_t
+                # half a period, to 32 bits more, is an int64_t; and it has some digits, whatever the runs have met
+                size = size_of(node.data / 2)
+                a = self.at(a, min(max(a.e, size - 30), size - COARSEST))
                 half = nearest(node.data / 2, a.e - 32)
                 most = min(half >> 32, LIMIT)
                 return Raw(make("q_wrap", (a.node,), (half,)), a.e, -most, most)

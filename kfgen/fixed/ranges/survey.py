@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from kfgen.fixed.ranges.drive import Drive
 from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.pace import Pace
 from kfgen.fixed.ranges.runs import Runner
@@ -12,12 +11,11 @@ from kfgen.logs import Log
 RUNS = ((1.0, 0.0, 0.5, 10), (2.0, 0.02, -0.5, 1), (1.0, 0.05, 0.0, 4))
 """Factor of the noises, share of outliers, correlation of the states that is given now and then, rows per reading."""
 STEPS = 300
-SEED = 21  # of the runs over the box
 LONG = 2000  # of a filter whose covariance does not depend on the data: to its steady state
 INFLATED = 2.0**22  # times a usual variance: what `adaptive` may make of it, or the usual one has no digits left
 
 
-def survey(runner: Runner, weather: Weather, drive: Drive, log: Log | None, linear: bool) -> Pace:
+def survey(runner: Runner, weather: Weather, log: Log | None, linear: bool) -> Pace:
     """Make them; what the steps of the nominal run changed.
 
     log: further runs of the user's. linear: the covariance does not depend on the data.
@@ -30,8 +28,6 @@ def survey(runner: Runner, weather: Weather, drive: Drive, log: Log | None, line
     for seed, (gain, outliers, correlation, every) in enumerate(RUNS, 2):
         columns, rows = weather.log(STEPS, Random(seed, gain), Random(100 + seed, gain, outliers))
         runner.run(columns, rows, correlation, every)
-    if weather.box.wide:
-        drive.run(SEED)
     return pace
 
 

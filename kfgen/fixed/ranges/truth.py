@@ -84,8 +84,10 @@ class Truth:
 
     def place(self, x: Sequence[float], noise: Sequence[float]) -> None:
         """Put the truth at x + noise, both (n), or as near to it as the box allows."""
-        wanted = [a + e for a, e in zip(x, noise, strict=True)]
-        inside = [self.box.inside(i, a) if part.flat else a for i, (a, part) in enumerate(zip(wanted, self.parts, strict=True))]
+        inside, wanted = [], []
+        for i, (a, e, part) in enumerate(zip(x, noise, self.parts, strict=True)):
+            wanted.append(a + e)
+            inside.append(self.box.inside(i, a + e) if part.flat else a + e)
         self.cut = [a - b for a, b in zip(wanted, inside, strict=True)]
         self.memory.arrays["kf.x"] = [part.placed(a) for a, part in zip(inside, self.parts, strict=True)]
 
