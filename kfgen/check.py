@@ -32,6 +32,7 @@ from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status, describe
 
 if TYPE_CHECKING:
+    from kfgen.logs import Log
     from kfgen.native.filter import NativeFilter
     from kfgen.reference import ReferenceFilter
 
@@ -87,13 +88,16 @@ class Outcome:
         return close and few and not self.errors_differ
 
 
-def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
-    """Compile `spec` and compare it with the reference. KfgenError without a compiler; SpecError."""
+def check(spec: Spec, steps: int = STEPS, seed: int = SEED, log: Log | None = None) -> Outcome:
+    """Compile `spec` and compare it with the reference. log: as `kfgen.generate.build` takes it.
+
+    KfgenError without a compiler; SpecError.
+    """
     from kfgen.generate import build
     from kfgen.native import load_filters
     from kfgen.reference import reference
 
-    generated = build(spec)
+    generated = build(spec, log=log)
     kf = load_filters([generated])[0]
     outcome = compare(kf, reference(spec), steps, seed, reference(spec))
     if generated.fixed is None:

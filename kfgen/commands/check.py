@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kfgen.commands.options import example, load_spec, scalar_option, spec_argument
+from kfgen.commands.options import example, load_spec, ranges_option, read_ranges, scalar_option, spec_argument
 from kfgen.commands.tables import Part, Table, Verdict, show
 
 if TYPE_CHECKING:
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 )
 @spec_argument
 @scalar_option
-def check(spec: Path, scalar: str | None) -> None:
+@ranges_option
+def check(spec: Path, scalar: str | None, ranges: Path | None) -> None:
     """Compile what would be emitted and hold it against the numpy reference on a random track.
 
     Prints the largest error of x (in standard deviations) and of P (relative to sqrt(P_ii P_jj)) and the
@@ -30,7 +31,8 @@ def check(spec: Path, scalar: str | None) -> None:
     """
     from kfgen.check import check as compare
 
-    outcome = compare(load_spec(spec, scalar))
+    loaded = load_spec(spec, scalar)
+    outcome = compare(loaded, log=read_ranges(ranges, loaded))
     show(*report(outcome))
     sys.exit(0 if outcome.passed else 1)
 

@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kfgen.scalar_names import is_fixed
+
 if TYPE_CHECKING:
+    from kfgen.logs import Log
     from kfgen.spec.types import Spec
 
 spec_argument = click.argument("spec", type=click.Path(path_type=Path), metavar="SPEC")
@@ -16,6 +19,19 @@ scalar_option = click.option(
     metavar="S",
     help="float, double or q<m>.<n> (such as q16.16) in place of the spec's own scalar.",
 )
+ranges_option = click.option(
+    "--ranges", "ranges", type=click.Path(path_type=Path), metavar="LOG.csv",
+    help="The log that `kfgen build --log` was given, whose ranges a fixed-point filter holds.",
+)  # fmt: skip
+
+
+def read_ranges(path: Path | None, spec: Spec) -> Log | None:
+    """The log that fixed point takes ranges from; other scalars have no use for one."""
+    if path is None or not is_fixed(spec.scalar):
+        return None
+    from kfgen.logs import read
+
+    return read(path, spec)
 
 
 def load_spec(path: Path, scalar: str | None = None) -> Spec:

@@ -10,7 +10,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.commands.options import example, load_spec, scalar_option, spec_argument
+from kfgen.commands.options import example, load_spec, ranges_option, read_ranges, scalar_option, spec_argument
 from kfgen.commands.progress import progress
 from kfgen.commands.tables import Table, on_terminal, show
 from kfgen.scalar_names import FLOAT
@@ -35,7 +35,8 @@ LONG = 200_000
 @click.option("-o", "out", type=click.Path(path_type=Path), metavar="OUT.csv", help="Where the estimates go.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the estimates.")
 @scalar_option
-def run(spec: Path, log: Path, out: Path | None, plot: Path | None, scalar: str | None) -> None:
+@ranges_option
+def run(spec: Path, log: Path, out: Path | None, plot: Path | None, scalar: str | None, ranges: Path | None) -> None:
     """Run the compiled filter over a log with the columns t, <input>, <sensor>.<component>.
 
     An empty cell is no measurement; a sensor with only some of its components is not updated, unless it is
@@ -56,7 +57,7 @@ def run(spec: Path, log: Path, out: Path | None, plot: Path | None, scalar: str 
     data = logs.read(log, loaded)
     if data.ignored:
         click.echo(f"kfgen: ignored columns of {log}: {', '.join(data.ignored)}", err=True)
-    kf = native.compile(loaded)
+    kf = native.compile(loaded, log=read_ranges(ranges, loaded))
     with progress(data.rows, data.rows >= LONG) as advance:
         result = kf.run(data, lambda done, rows: advance(done, "running"))
     _report(result)

@@ -52,9 +52,9 @@ class FixedFilter:
         return lines(self.certificates)
 
 
-def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> FixedFilter:
-    """Scale and lower a filter. log: runs beside the simulated ones. Raises SpecError where ranges do not fit."""
-    return _Builder(code, scalar, log).build()
+def build_fixed(code: FilterCode, scalar: Fixed, logs: Sequence[Log] = ()) -> FixedFilter:
+    """Scale and lower a filter. logs: runs beside the simulated ones. Raises SpecError where ranges do not fit."""
+    return _Builder(code, scalar, logs).build()
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class _Lowered:
 class _Builder:
     """Tries formats for the whole box first, then for less of it."""
 
-    def __init__(self, code: FilterCode, scalar: Fixed, log: Log | None) -> None:
+    def __init__(self, code: FilterCode, scalar: Fixed, logs: Sequence[Log]) -> None:
         self.scalar = scalar
         self.real = replace(code, functions=tuple(unrolled(f, code.constants) for f in code.functions))
         self.functions = list(self.real.functions)
@@ -80,7 +80,7 @@ class _Builder:
         self.drive = Drive(self.weather, self.box)
         self.linear = linear(self.real)
         self.runner = Runner(self.real, self.program, self.ranges)
-        self.pace = survey(self.runner, self.weather, log, self.linear)
+        self.pace = survey(self.runner, self.weather, logs, self.linear)
         self.met = self.ranges.copy()
 
     def build(self) -> FixedFilter:

@@ -115,7 +115,8 @@ class Builder:
             return Fixed()
         scale = f.get("scale")
         by_state = dict(entries(scale)) if isinstance(scale, Fields) else None
-        return Fixed(by_state, f.get("rounding", "nearest"), f.get("overflow", "saturate"))
+        at = f.places.get("log", f.place)
+        return Fixed(by_state, f.get("rounding", "nearest"), f.get("overflow", "saturate"), f.get("log"), at)
 
     def code(self) -> Code:
         f = self.top.get("code")
