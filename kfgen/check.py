@@ -32,7 +32,7 @@ from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status, describe
 
 if TYPE_CHECKING:
-    from kfgen.logs import Log
+    from kfgen.generate import Generated
     from kfgen.native.filter import NativeFilter
     from kfgen.reference import ReferenceFilter
 
@@ -88,8 +88,8 @@ class Outcome:
         return close and few and not self.errors_differ
 
 
-def check(spec: Spec, steps: int = STEPS, seed: int = SEED, log: Log | None = None) -> Outcome:
-    """Compile `spec` and compare it with the reference. log: as `kfgen.generate.build` takes it.
+def check(spec: Spec, steps: int = STEPS, seed: int = SEED, generated: Generated | None = None) -> Outcome:
+    """Compile `spec`, or what was generated of it, and compare it with the reference.
 
     KfgenError without a compiler; SpecError.
     """
@@ -97,7 +97,7 @@ def check(spec: Spec, steps: int = STEPS, seed: int = SEED, log: Log | None = No
     from kfgen.native import load_filters
     from kfgen.reference import reference
 
-    generated = build(spec, log=log)
+    generated = build(spec) if generated is None else generated
     kf = load_filters([generated])[0]
     outcome = compare(kf, reference(spec), steps, seed, reference(spec))
     if generated.fixed is None:

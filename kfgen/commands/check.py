@@ -30,9 +30,10 @@ def check(spec: Path, scalar: str | None, ranges: Path | None) -> None:
     fixed point.
     """
     from kfgen.check import check as compare
+    from kfgen.generate import build as generate
 
     loaded = load_spec(spec, scalar)
-    outcome = compare(loaded, log=read_ranges(ranges, loaded))
+    outcome = compare(loaded, generated=generate(loaded, log=read_ranges(ranges, loaded)))
     show(*report(outcome))
     sys.exit(0 if outcome.passed else 1)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from kfgen.emit.fixed_point import FixedPoint
 from kfgen.errors import SpecError
@@ -18,7 +18,7 @@ from kfgen.fixed.linear import linear
 from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
 from kfgen.fixed.program.unroll import unrolled
-from kfgen.fixed.ranges.drive import Drive
+from kfgen.fixed.ranges.drive import Drive, Seen
 from kfgen.fixed.ranges.intervals import Intervals, spread
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
@@ -30,6 +30,7 @@ from kfgen.fixed.trial.certificate import Certificate, certify, lines
 from kfgen.fixed.trial.integers import IntegerProgram
 from kfgen.fixed.trial.judge import hear, judge, refuse
 from kfgen.fixed.trial.tour import Tour
+from kfgen.ir.nodes import Node
 from kfgen.logs import Log
 
 WIDER = 2.0**6  # times what runs have met: an interval that is wider than that has overrated its value
@@ -46,10 +47,11 @@ class FixedFilter:
     formats: Formats
     certificates: tuple[Certificate, ...]  # of its functions
     view: FixedPoint
+    widest: Mapping[str, Seen] = field(default_factory=dict)  # how far the runs over the declared box have gone
 
     def certified(self) -> tuple[str, ...]:
         """The certificates as a table."""
-        return lines(self.certificates)
+        return lines(self.certificates, {name: (seen.low, seen.high) for name, seen in self.widest.items()})
 
 
 def build_fixed(code: FilterCode, scalar: Fixed, logs: Sequence[Log] = ()) -> FixedFilter:
@@ -82,6 +84,7 @@ class _Builder:
         self.runner = Runner(self.real, self.program, self.ranges)
         self.pace = survey(self.runner, self.weather, logs, self.linear)
         self.met = self.ranges.copy()
+        self.sizes: Mapping[Node, float] = {}
 
     def build(self) -> FixedFilter:
         if not self.box.wide:
@@ -103,6 +106,7 @@ class _Builder:
         self.drive.run(Recorder(self.runner, self.box, limits), DRIVEN)
         intervals = Intervals(self.real.model, self.box, self.ranges)
         intervals.read(self.functions)
+        self.sizes = intervals.sizes
         spread(intervals, WIDER)
 
     def _toured(self, limits: Sequence[float]) -> FixedFilter:
@@ -120,7 +124,8 @@ class _Builder:
     def _lowered(self) -> _Lowered:
         hear(self.real.model.spec, self.runner.heard)
         noise = self.weather.process_noise()
-        formats = choose(self.real, self.arrays, self.ranges, self.scalar.bits, self.linear, noise, self.pace)
+        formats = choose(self.real, self.arrays, self.ranges, self.scalar.bits, self.linear, noise, self.pace,
+                         self.sizes)  # fmt: skip
         code = lower(self.real, formats)
         return _Lowered(code, formats, IntegerProgram(list(code.functions), self.arrays, self.scalar))
 
@@ -131,5 +136,5 @@ class _Builder:
         """What is handed on."""
         view = FixedPoint(self.scalar.bits, units(found.code, found.formats), table(found.formats),
                           self.scalar.rounding == "floor", closure, tables, periods(self.real.model))  # fmt: skip
-        certificates = certify(found.code.functions, found.program.peaks)
-        return FixedFilter(found.code, self.real, found.formats, certificates, view)
+        certificates = certify(found.code.functions, found.program.peaks, found.formats.fitting)
+        return FixedFilter(found.code, self.real, found.formats, certificates, view, dict(self.drive.seen))

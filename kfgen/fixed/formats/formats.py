@@ -6,6 +6,7 @@ Of what is not chosen: from the largest value of the runs with HEADROOM bits abo
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from kfgen.fixed.arithmetic.limits import BITS, OUTSIDE
@@ -56,6 +57,8 @@ class Formats:
     fixed: dict[Cell, int] = field(default_factory=dict)
     report: list[Quantity] = field(default_factory=list)
     carried: dict[Cell, int] = field(default_factory=dict)  # cells with digits below their LSB -> place in kf.rest
+    sizes: Mapping[Node, float] = field(default_factory=dict)  # what no value exceeds anywhere in the declared box
+    fitting: dict[int, Node] = field(default_factory=dict)  # operations, by id, of which that shows that they fit
 
     def of(self, cell: Cell) -> int | None:
         """The exponent of a cell; None where the runs have told nothing."""

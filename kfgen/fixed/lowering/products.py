@@ -173,7 +173,7 @@ class Products(Quotients):
             case "mul":
                 a, b = self.constant_first(node.args)
                 if self._special(a, b):
-                    return None
+                    return self._finest(a, b)
                 if a.constant is not None:
                     inner = self.digits(b)
                     return None if inner is None or a.constant == 0 else inner + size_of(a.constant) - 4
@@ -187,6 +187,15 @@ class Products(Quotients):
             case "variable" if node.data in self.c.inverses or node.data in self.c.ratios:
                 return None
         return self.value(node).e
+
+    def _finest(self, a: Node, b: Node) -> int | None:
+        """The finest exponent that a division of one by what the other is the reciprocal of has a use for."""
+        if self._inverse_of(a) is not None:
+            a, b = b, a
+        inverse = self._inverse_of(b)
+        if inverse is None or a.constant is not None or self._special(a):
+            return None
+        return self.finest(self.value(a), inverse[0])
 
     def roomier(self, node: Node, e: int | None) -> int | None:
         """An exponent a little coarser at which a product is proved to fit, if there is one."""

@@ -22,6 +22,7 @@ class Intervals:
     """The intervals of the nodes of functions.
 
     inner: node -> the span of all that is computed on the way to it (terms, partial sums) and of its value.
+    sizes: node -> what none of that exceeds, in whichever order terms are added.
     """
 
     def __init__(self, model: Model, box: Box, ranges: Ranges) -> None:
@@ -29,6 +30,7 @@ class Intervals:
         self.box = box
         self.ranges = ranges
         self.inner: dict[Node, Span] = {}
+        self.sizes: dict[Node, float] = {}
         self._known: dict[int, Span | None] = {}
         self._locals: dict[str, Node] = {}
         self._function = ""
@@ -73,8 +75,12 @@ class Intervals:
         return self._known[key]
 
     def _keep(self, node: Node, span: Span) -> None:
+        self.sizes[node] = max(self.sizes.get(node, 0.0), size(span))
         before = self.inner.get(node)
         self.inner[node] = span if before is None else reckon.hull(before, span)
+
+    def _bound(self, node: Node, terms: list[Span]) -> None:
+        self.sizes[node] = max(self.sizes.get(node, 0.0), math.fsum(map(size, terms)))
 
     def _value(self, node: Node) -> Span | None:
         match node.op:
@@ -113,6 +119,7 @@ class Intervals:
                 b = args[1] if node.op == "add" else reckon.minus(args[1])
                 for a in args:
                     self._keep(node, a)
+                self._bound(node, args)
                 return reckon.plus(args[0], b)
             case "mul":
                 same = self._same(*node.args)
@@ -129,6 +136,7 @@ class Intervals:
     def _sum(self, node: Node) -> Span | None:
         total: Span | None = (0.0, 0.0)
         kept: list[Span] = []
+        terms: list[Span] = []
         for sign, factors in grouped(node.data, node.args):
             spans = [self.value(f) for f in factors]
             known = [s for s in spans if s is not None]
@@ -141,7 +149,9 @@ class Intervals:
             if total is not None:
                 total = reckon.plus(total, term if sign > 0 else reckon.minus(term))
                 kept += [term, total]
+                terms.append(term)
         if total is not None:
+            self._bound(node, terms)
             self._keep(node, reckon.hull(*kept))
         return total
 

@@ -10,7 +10,7 @@ from kfgen.fixed.ranges.generator import Random
 from kfgen.model import Model
 
 LEGS = 16
-CORNER = 3 / 8  # the share of legs that begin and drive at the ends of everything
+CORNER = 1 / 2  # the share of legs that begin and drive at the ends of everything
 NEAR = 1e-6  # of a range: how near to its end a corner is
 VANISHING = 1 / 32  # the same where the lower end of a parameter is 0: what a noise of nothing leaves has no size
 
@@ -36,12 +36,15 @@ def legs(model: Model, box: Box, random: Random, count: int = LEGS) -> Iterator[
     names = [*(f"x.{s}" for s in model.states), *(f"p.{name}" for name, _ in model.parameters),
              *(f"u.{name}" for name in model.inputs), "dt"]  # fmt: skip
     cube = {name: _shuffled(count, random) for name in names}
+    places: dict[str, float] = {}
     for k in range(count):
         corner = k < CORNER * count
-        places = {}
-        for name in names:
-            place = (cube[name][k] + random.random()) / count
-            places[name] = float(place >= 0.5) if corner else place
+        if corner and k % 2:
+            places = {name: 1.0 - place for name, place in places.items()}  # the opposite corner
+        else:
+            places = {name: (cube[name][k] + random.random()) / count for name in names}
+        if corner:
+            places = {name: float(place >= 0.5) for name, place in places.items()}
         x = []
         for i, (state, start) in enumerate(zip(model.states, model.x0, strict=True)):
             span = box.states[i]
@@ -49,7 +52,7 @@ def legs(model: Model, box: Box, random: Random, count: int = LEGS) -> Iterator[
         parameters = {name: float(value) for name, value in model.parameters}
         for name, span in box.parameters.items():
             parameters[name] = at(span, places[f"p.{name}"], VANISHING if span[0] == 0 else NEAR)
-        yield Leg(corner, k % 2 == 0, k % 3 == 2, x, parameters, places)
+        yield Leg(corner, k % 4 < 2, k % 3 == 2, x, parameters, places)
 
 
 def _shuffled(count: int, random: Random) -> list[int]:
