@@ -101,6 +101,7 @@ def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Genera
     told = replace(summary(real, view), prediction=_predicted(spec, result.code, scalar, view, judge))
     if spec.code.unroll == "none":
         told.notes.append(UNROLLED)
+    told.notes.extend(result.told)
     told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
     return Generated(render(view), told, result.code, view, result)
 

@@ -18,6 +18,7 @@ from kfgen.fixed.linear import linear
 from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
 from kfgen.fixed.program.unroll import unrolled
+from kfgen.fixed.ranges.box import Box
 from kfgen.fixed.ranges.drive import Drive, Seen
 from kfgen.fixed.ranges.intervals import Intervals, spread
 from kfgen.fixed.ranges.ranges import Ranges
@@ -29,7 +30,7 @@ from kfgen.fixed.ranges.weather import Weather
 from kfgen.fixed.trial.certificate import Certificate, certify, lines
 from kfgen.fixed.trial.integers import IntegerProgram
 from kfgen.fixed.trial.judge import hear, judge, refuse
-from kfgen.fixed.trial.tour import Tour
+from kfgen.fixed.trial.tour import ShakenTour, Tour
 from kfgen.ir.nodes import Node
 from kfgen.logs import Log
 
@@ -48,15 +49,33 @@ class FixedFilter:
     certificates: tuple[Certificate, ...]  # of its functions
     view: FixedPoint
     widest: Mapping[str, Seen] = field(default_factory=dict)  # how far the runs over the declared box have gone
+    told: tuple[str, ...] = ()  # where in the box the filter has not been held
 
     def certified(self) -> tuple[str, ...]:
         """The certificates as a table."""
-        return lines(self.certificates, {name: (seen.low, seen.high) for name, seen in self.widest.items()})
+        widest = {name: (seen.low, seen.high) for name, seen in self.widest.items()}
+        return *lines(self.certificates, widest), *self.told
 
 
 def build_fixed(code: FilterCode, scalar: Fixed, logs: Sequence[Log] = ()) -> FixedFilter:
     """Scale and lower a filter. logs: runs beside the simulated ones. Raises SpecError where ranges do not fit."""
     return _Builder(code, scalar, logs).build()
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the declared box: that where no variance is beyond its limit; none: all of it."""
+
+    box: Box
+    limits: Sequence[float]
+
+
+def _less(part: Part, reason: SpecError) -> tuple[str, ...]:
+    """What is said of a filter that holds in a part of its box only."""
+    where = "where a standard deviation is within half of its state's range"
+    if not any(part.box.states):
+        where += ", and states near where the model itself leads"
+    return (f"holds {where}, not in all of the declared ranges: {reason.mistakes[0].message}",)
 
 
 @dataclass(frozen=True)
@@ -79,7 +98,6 @@ class _Builder:
         self.program = RealProgram(self.functions, self.arrays, self.ranges)
         self.weather = Weather(self.real)
         self.box = self.weather.box
-        self.drive = Drive(self.weather, self.box)
         self.linear = linear(self.real)
         self.runner = Runner(self.real, self.program, self.ranges)
         self.pace = survey(self.runner, self.weather, logs, self.linear)
@@ -92,34 +110,47 @@ class _Builder:
             self._judged(found)
             return self._filter(found)
         refusals: list[SpecError] = []
-        for limits in ((), unknown(self.box)):
+        whole, known = Part(self.box, ()), unknown(self.box)
+        for part in (whole, Part(self.box, known), Part(self.box.without_states(), known)):
             self.ranges.restore(self.met)
-            self._drive(limits)
+            drive = Drive(self.weather, part.box)
+            self._see(drive, part)
             try:
-                return self._toured(limits)
+                made = self._toured(drive, part)
             except SpecError as error:
                 refusals.append(error)
+            else:
+                return made if part is whole else replace(made, told=(*made.told, *_less(part, refusals[0])))
         raise refusals[0]
 
-    def _drive(self, limits: Sequence[float]) -> None:
-        """Runs over the box, and what intervals say of it."""
-        self.drive.run(Recorder(self.runner, self.box, limits), DRIVEN)
-        intervals = Intervals(self.real.model, self.box, self.ranges)
+    def _see(self, drive: Drive, part: Part) -> None:
+        """Runs over a part of the box, and what intervals say of it."""
+        drive.run(Recorder(self.runner, self.box, part.limits), DRIVEN)
+        intervals = Intervals(self.real.model, part.box, self.ranges)
         intervals.read(self.functions)
         self.sizes = intervals.sizes
         spread(intervals, WIDER)
 
-    def _toured(self, limits: Sequence[float]) -> FixedFilter:
-        """A filter that has been tried all over the box; what its trial has met counts where something saturated."""
+    def _toured(self, drive: Drive, part: Part) -> FixedFilter:
+        """A filter that has been tried all over a part; what its trial has met counts where something saturated."""
         for last in (False, True):
-            found = self._lowered()
-            self._judged(found)
-            tour = Tour(self.program, found.program, self.real, found.formats, found.code, self.box, limits)
-            self.drive.run(tour, TRIED, LEGS, ROWS)
+            met = self._lowered()
+            try:
+                self._judged(met)
+            except SpecError:
+                if last:  # what the first one was short of costs more than there is
+                    break
+                raise
+            found = met
+            tour = Tour(self.program, found.program, self.real, found.formats, found.code, self.box, part.limits)
+            drive.run(tour, TRIED, LEGS, ROWS)
             if last or not tour.found.saturated:
                 break
-        refuse(tour.found, self.real, found.formats, self.scalar)
-        return self._filter(found)
+        if not tour.found.carried:
+            shaken = ShakenTour(self.program, self.real, found.formats, self.box, part.limits)
+            drive.run(shaken, TRIED, LEGS, ROWS)
+            refuse(tour.found, shaken.found, self.real, found.formats, self.scalar)
+        return replace(self._filter(found), widest=dict(drive.seen))
 
     def _lowered(self) -> _Lowered:
         hear(self.real.model.spec, self.runner.heard)
@@ -137,4 +168,4 @@ class _Builder:
         view = FixedPoint(self.scalar.bits, units(found.code, found.formats), table(found.formats),
                           self.scalar.rounding == "floor", closure, tables, periods(self.real.model))  # fmt: skip
         certificates = certify(found.code.functions, found.program.peaks, found.formats.fitting)
-        return FixedFilter(found.code, self.real, found.formats, certificates, view, dict(self.drive.seen))
+        return FixedFilter(found.code, self.real, found.formats, certificates, view)

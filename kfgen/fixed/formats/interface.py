@@ -103,7 +103,8 @@ class Interface:
         declared = max(self._limit(state.range), self._limit(state.bounds), float(self.model.periods[i] or 0) / 2)
         variance = self._variance(i)
         # P_ii has the LSB 2^(2 e + n) outside, and has to fit there too
-        least = math.ceil((above(variance) + 1 - OUTSIDE - self.f.bits) / 2) if variance else None
+        room = 1 + self.f.more  # where gains depend on the data, so do variances
+        least = math.ceil((above(variance) + room - OUTSIDE - self.f.bits) / 2) if variance else None
         if self.model.periods[i] is not None:  # wrapped before it is stored
             self.f.ranges.see(cell, float(self.model.periods[i] or 0) / 2)
         return self._quantity(cell, state.name, declared, HEADROOM + 1, least, "so that its variance fits")

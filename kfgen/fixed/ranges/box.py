@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from kfgen.fixed.ranges.declared import limits, number
@@ -30,6 +30,10 @@ class Box:
     def wide(self) -> bool:
         """Whether anything is declared that a run as the model says does not go through by itself."""
         return bool(self.inputs or self.parameters or self.dt or any(self.states))
+
+    def without_states(self) -> Box:
+        """The same box of all else."""
+        return replace(self, states=(None,) * len(self.states))
 
     def inside(self, i: int, value: float) -> float:
         """Brought into the span of state i."""

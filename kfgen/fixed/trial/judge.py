@@ -9,18 +9,17 @@ from kfgen.errors import Mistake, SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.formats.formats import Formats
+from kfgen.fixed.ranges.declared import limits
 from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.real import RealProgram
 from kfgen.fixed.ranges.weather import Weather
 from kfgen.fixed.trial.integers import IntegerProgram
 from kfgen.fixed.trial.probe import probe, shaken
-from kfgen.fixed.trial.tour import Found
+from kfgen.fixed.trial.tour import FAILING, WIDE, Found
 from kfgen.spec.types import Spec
 
 PROBED = 120  # rows that the integers are tried on
 CHAOTIC = 16.0  # times as far as real numbers depart by less than what formats lose
-FAILING = 0.25  # standard deviations by which they may be off
-WIDE = 0.4  # the share of itself by which a variance may be, all over the box
 
 
 def judge(program: RealProgram, real: FilterCode, integers: IntegerProgram, integer: FilterCode, formats: Formats,
@@ -36,7 +35,7 @@ def judge(program: RealProgram, real: FilterCode, integers: IntegerProgram, inte
     what, bits = _carrying(formats, found.state, real, scalar), _missing(found.sigmas)
     raise SpecError.at(
         state.place, f"{what}; {bits} bit{'s' * (bits > 1)} are missing",
-        "start with a smaller std, declare a range, try covariance: sqrt, or use float",
+        _cure(real, found.state, bits),
     )  # fmt: skip
 
 
@@ -53,18 +52,39 @@ def hear(spec: Spec, heard: Collection[str]) -> None:
         raise SpecError(mistakes)
 
 
-def refuse(found: Found, real: FilterCode, formats: Formats, scalar: Fixed) -> None:
-    """SpecError where the integers have not followed everywhere in the declared box."""
-    if found.sigmas <= FAILING and found.share <= WIDE and not found.errors:
+def refuse(found: Found, shaken: Found, real: FilterCode, formats: Formats, scalar: Fixed) -> None:
+    """SpecError where the integers have not followed everywhere in the declared box.
+
+    shaken: what digits that no format keeps make of the model there, which may magnify whatever is rounded.
+    """
+    far = found.sigmas > max(FAILING, CHAOTIC * shaken.sigmas)
+    if not far and found.share <= max(WIDE, CHAOTIC * shaken.share) and not found.errors:
         return
-    i = found.state if found.sigmas > FAILING else found.widest
+    i = found.state if far else found.widest
     bits = max(_missing(found.sigmas), math.ceil(math.log2(max(min(found.share, 1e9) / WIDE, 2.0))))
     what = _carrying(formats, i, real, scalar)
     raise SpecError.at(
         real.model.spec.states[i].place,
         f"{what}, everywhere in the declared ranges; {bits} bit{'s' * (bits > 1)} missing",
-        f"narrow the ranges of what it depends on, by a factor of {2**bits}, or use float",
+        f"{_narrower(real, i, bits)}; or use covariance: sqrt, or float",
     )  # fmt: skip
+
+
+def _cure(real: FilterCode, i: int, bits: int) -> str:
+    cure = "start with a smaller std, declare a range, try covariance: sqrt, or use float"
+    return cure if real.model.spec.states[i].range is None else f"{_narrower(real, i, bits)}; or {cure}"
+
+
+def _narrower(real: FilterCode, i: int, bits: int) -> str:
+    """The range of a state that is by so many bits smaller, or which others would have to be."""
+    model = real.model
+    state = model.spec.states[i]
+    if state.range is None:
+        return f"narrow the ranges of what it depends on by a factor of {2**bits}"
+    low, high = limits(state.range, model.spec)
+    middle = min(max(float(model.x0[i]), low), high)
+    low, high = (middle + (end - middle) / 2**bits for end in (low, high))
+    return f"range: [{low:.4g}, {high:.4g}] would fit, or narrow those of what it depends on by a factor of {2**bits}"
 
 
 def _missing(sigmas: float) -> int:

@@ -155,13 +155,10 @@ class Probe:
         return worst
 
 
-class _Shaken(Probe):
-    """`b` is of real numbers too, a little off."""
+class Shaking(Probe):
+    """`b` is of real numbers too, a little off: after each row x is rounded to its LSB, and P shaken."""
 
-    def __init__(self, real: RealProgram, code: FilterCode, formats: Formats) -> None:
-        super().__init__(real, real, code, formats, code)
-        self.b = blank(code)
-        self.sign = 1.0
+    sign = 1.0
 
     def give(self, cell: Cell, path: str, value: float) -> None:
         super().give(cell, path, value)
@@ -183,6 +180,14 @@ class _Shaken(Probe):
 
     def _others(self) -> None:
         pass
+
+
+class _Shaken(Shaking):
+    """Over a log."""
+
+    def __init__(self, real: RealProgram, code: FilterCode, formats: Formats) -> None:
+        super().__init__(real, real, code, formats, code)
+        self.b = blank(code)
 
 
 def integers(memory: Memory) -> Memory:
