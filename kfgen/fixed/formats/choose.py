@@ -18,13 +18,14 @@ MORE = 2  # bits of head-room where gains depend on the data, so that no run sho
 
 
 def choose(code: FilterCode, arrays: Arrays, ranges: Ranges, bits: int, linear: bool,
-           noise: list[list[float]], pace: Pace, sizes: Mapping[Node, float]) -> Formats:  # fmt: skip
+           noise: list[list[float]], pace: Pace, sizes: Mapping[Node, float], spare: int) -> Formats:  # fmt: skip
     """The formats of the interface and of the covariance; all others follow from the ranges.
 
     linear: the covariance does not depend on the data. noise: what a step adds to each variance (modes, n).
-    pace: what the steps of a run changed. sizes: what values cannot exceed anywhere in the declared box.
+    pace: what the steps of a run changed. sizes: what values cannot exceed anywhere in the declared box. spare: bits of
+    further head-room that covariances get where they depend on the data.
     """
-    formats = Formats(arrays, ranges, bits, 0 if linear else MORE, sizes=sizes)
+    formats = Formats(arrays, ranges, bits, 0 if linear else MORE, 0 if linear else spare, sizes=sizes)
     Interface(code, formats).choose()
     covariances(code, formats, noise)
     carry(code, formats, pace)

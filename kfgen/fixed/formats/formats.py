@@ -54,6 +54,7 @@ class Formats:
     ranges: Ranges
     bits: int  # n of q<m>.<n>
     more: int = 0  # further head-room
+    spare: int = 0  # that of covariances
     fixed: dict[Cell, int] = field(default_factory=dict)
     report: list[Quantity] = field(default_factory=list)
     carried: dict[Cell, int] = field(default_factory=dict)  # cells with digits below their LSB -> place in kf.rest
@@ -68,7 +69,8 @@ class Formats:
             if largest == 0:
                 return None
             covariance = cell[0] == "array" and plain(str(cell[1])) in ("kf.D", "kf.P")
-            found = self.fixed[cell] = exponent(largest, COVARIANCE if covariance else HEADROOM + self.more)
+            kept = COVARIANCE + self.spare if covariance else HEADROOM + self.more
+            found = self.fixed[cell] = exponent(largest, kept)
         return found
 
     def node(self, node: Node, headroom: int = PASSING) -> int | None:

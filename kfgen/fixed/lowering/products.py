@@ -79,6 +79,10 @@ class Products(Quotients):
             return Raw(make("q_mac", args, (s,)), e, max(low, -INSIDE), min(high, INSIDE))
         return Raw(make("q_mul", (a.node, b.node), (s,)), e, max(low, -LIMIT), min(high, LIMIT))
 
+    def scaled_product(self, a: Raw, b: Raw, e: int) -> Raw:
+        """a b at e, which is no finer than the product is."""
+        return self._mul(a, b, e - a.e - b.e, e)
+
     def _within(self, a: Raw, b: Raw, s: int, most: int | None) -> tuple[Raw, Raw, int, int | None]:
         """Factors of which one has so few digits that s is at most LAST: it costs 1/8 of the product's LSB."""
         extra = s - LAST

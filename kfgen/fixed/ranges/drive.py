@@ -18,6 +18,7 @@ from kfgen.fixed.ranges.weather import Weather
 
 ROWS = 30  # of a leg
 DARK = 0.2  # the share of its rows after which a dark leg has no readings
+BLINK = 6  # rows without readings at a corner
 HELD = 6  # rows for which an input keeps its value, at least
 
 
@@ -92,7 +93,8 @@ class Drive:
                 return
             if any(truth.cut):  # and the estimate with it
                 self._place(player, [a - c for a, c in zip(player.estimate(), truth.cut, strict=True)])
-            dark = leg.dark and DARK * rows <= row < rows - 2
+            end = DARK * rows + BLINK if leg.corner else rows - 2  # at the ends of everything variances grow fast
+            dark = leg.dark and DARK * rows <= row < end
             sensors = () if dark else self.model.sensors
             readings = {s.name: self._reading(mode, i, random) for i, s in enumerate(sensors)}
             if not player.row(inputs, dt, readings, row):
