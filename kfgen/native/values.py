@@ -101,8 +101,10 @@ class Fixed(Value):
     def near(self, values: Array, periods: Array) -> Array:
         """Within half a period of 0, to which a format of limited size would cut them off otherwise."""
         values = np.asarray(values, dtype=np.float64)
-        turns = np.rint(values / periods)
-        return np.where(np.isfinite(values) & (turns != 0), values - np.where(turns == 0, 0.0, periods) * turns, values)
+        repeating = np.isfinite(values) & np.isfinite(periods)
+        period = np.where(repeating, periods, 1.0)
+        turns = np.where(repeating, np.rint(np.where(repeating, values, 0.0) / period), 0.0)
+        return np.asarray(values - period * turns)
 
     def to_physical(self, raw: NDArray[Any], unit: Array | float) -> Array:
         return np.asarray(raw).astype(np.float64) * unit
