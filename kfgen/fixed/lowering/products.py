@@ -12,6 +12,8 @@ from kfgen.fixed.lowering.raw import FIRST, LAST, ROOMIER, USEFUL, Raw, interval
 from kfgen.fixed.program.nodes import constant, make, terms
 from kfgen.ir.nodes import Node
 
+NOTHING = 8  # bits below what a quotient has a use for: a value that is so small is zero but for round-off
+
 
 class Products(Quotients):
     """Lowers products."""
@@ -177,7 +179,7 @@ class Products(Quotients):
             case "mul":
                 a, b = self.constant_first(node.args)
                 if self._special(a, b):
-                    return self._finest(a, b)
+                    return self._finest(node, a, b)
                 if a.constant is not None:
                     inner = self.digits(b)
                     return None if inner is None or a.constant == 0 else inner + size_of(a.constant) - 4
@@ -192,14 +194,16 @@ class Products(Quotients):
                 return None
         return self.value(node).e
 
-    def _finest(self, a: Node, b: Node) -> int | None:
-        """The finest exponent that a division of one by what the other is the reciprocal of has a use for."""
+    def _finest(self, node: Node, a: Node, b: Node) -> int | None:
+        """The finest exponent that a division of one by what the other is the reciprocal of has a use for, where runs
+        have shown nothing but round-off of it."""
         if self._inverse_of(a) is not None:
             a, b = b, a
         inverse = self._inverse_of(b)
         if inverse is None or a.constant is not None or self._special(a):
             return None
-        return self.finest(self.value(a), inverse[0])
+        finest, natural = self.finest(self.value(a), inverse[0]), self.natural(node)
+        return finest if natural is not None and finest > natural + NOTHING else None
 
     def roomier(self, node: Node, e: int | None) -> int | None:
         """An exponent a little coarser at which a product is proved to fit, if there is one."""

@@ -144,8 +144,7 @@ class Statements:
             if e is not None and name in self.ties:
                 least = self.c.formats.node(node, 0)
                 e = None if least is not None and least > e else e
-            planned = e is not None and (node.op == "sum" or _divides(node))
-            if name not in self.ties and (node.op == "mul" or planned):
+            if name not in self.ties and (node.op == "mul" or (node.op == "sum" and e is not None)):
                 e = self.x.useful(node, e)
             if name not in self.ties and node.op == "mul":
                 e = self.x.roomier(node, e)
@@ -217,10 +216,3 @@ class Statements:
                 args.append(given)
         args.append("flags" if self.f.private else "&flags")
         return Call(self.done[s.callee.name], args)
-
-
-def _divides(node: Node) -> bool:
-    """Whether a value is a quotient, or one where a condition holds."""
-    while node.op == "select" and node.args[2].constant is not None:
-        node = node.args[1]
-    return node.op == "div"

@@ -18,7 +18,7 @@ from kfgen.fixed.ranges.weather import Weather
 
 ROWS = 30  # of a leg
 DARK = 0.2  # the share of its rows after which a dark leg has no readings
-BLINK = 6  # rows without readings at a corner
+BLINK = 10  # rows without readings at a corner
 HELD = 6  # rows for which an input keeps its value, at least
 
 
