@@ -35,6 +35,7 @@ from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status, describe
 
 if TYPE_CHECKING:
+    from kfgen.generate import Generated
     from kfgen.native.filter import NativeFilter
     from kfgen.reference import ReferenceFilter
 
@@ -91,13 +92,16 @@ class Outcome:
         return close and few and not self.errors_differ and not self.coarse
 
 
-def check(spec: Spec, steps: int = STEPS, seed: int = SEED) -> Outcome:
-    """Compile `spec` and compare it with the reference. KfgenError without a compiler; SpecError."""
+def check(spec: Spec, steps: int = STEPS, seed: int = SEED, generated: Generated | None = None) -> Outcome:
+    """Compile `spec`, or what was generated of it, and compare it with the reference.
+
+    KfgenError without a compiler; SpecError.
+    """
     from kfgen.generate import build
     from kfgen.native import load_filters
     from kfgen.reference import reference
 
-    generated = build(spec)
+    generated = build(spec) if generated is None else generated
     kf = load_filters([generated])[0]
     outcome = compare(kf, reference(spec), steps, seed, reference(spec))
     if generated.fixed is None:

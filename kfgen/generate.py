@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 
 from kfgen.budgets import Prediction, exceeded, predict
 from kfgen.emit.data import View
 from kfgen.emit.declarations import Declarations, declarations
 from kfgen.emit.render import render
 from kfgen.emit.view import make_view
-from kfgen.errors import SpecError
+from kfgen.errors import KfgenError, SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.build import FixedFilter, build_fixed
 from kfgen.ir.count import operations
 from kfgen.ir.names import RESERVED
-from kfgen.logs import Log
+from kfgen.logs import Log, read
 from kfgen.scalars import SCALARS, Scalar
 from kfgen.seal import sealed
 from kfgen.spec.types import Spec
@@ -61,7 +62,7 @@ class Generated:
 
 def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judge: bool = True) -> Generated:
     """Generate a spec's files. scalar overrides the spec's; log: what a q scalar takes its ranges from, beside
-    simulated runs. Raises SpecError.
+    simulated runs and the log that the spec names. Raises SpecError.
 
     judge: whether a budget that the prediction exceeds is an error.
     """
@@ -108,13 +109,29 @@ def _predicted(spec: Spec, code: FilterCode, scalar: Scalar, view: View, judge: 
 def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Generated:
     scalar = Fixed(spec.scalar, spec.fixed.rounding)
     real = build_filter(spec, scalar, RESERVED)
-    result = build_fixed(real, scalar, log)
+    logs = [each for each in (_named(spec), log) if each is not None]
+    result = build_fixed(real, scalar, logs)
     view = make_view(result.code, scalar, overridden, result.view)
     told = replace(summary(real, view), prediction=_predicted(spec, result.code, scalar, view, judge))
     if spec.code.unroll == "none":
         told.notes.append(UNROLLED)
+    told.notes.extend(result.told)
     told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
     return Generated(_rendered(view), told, result.code, view, result)
+
+
+def _named(spec: Spec) -> Log | None:
+    """The log that a spec names, by its path from the spec's folder. SpecError where it cannot be read."""
+    if spec.fixed.log is None:
+        return None
+    path = Path(spec.file).parent / spec.fixed.log
+    try:
+        return read(path, spec)
+    except OSError as error:
+        reason = error.strerror or str(error)
+    except KfgenError as error:
+        reason = str(error)
+    raise SpecError.at(spec.fixed.log_place, f"the log {path} cannot be read: {reason}", "name a log of this filter")
 
 
 def summary(code: FilterCode, view: View) -> Summary:

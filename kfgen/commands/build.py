@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kfgen.commands.options import example, load_spec, quiet_option, scalar_option, tell_advice
+from kfgen.commands.options import example, load_spec, quiet_option, read_ranges, scalar_option, tell_advice
 from kfgen.commands.progress import progress
 from kfgen.commands.tables import Notes, Part, Paths, Table, show
 from kfgen.errors import KfgenError, Mistake, SpecError
@@ -21,7 +21,6 @@ from kfgen.seal import is_edited, is_same, sealed
 
 if TYPE_CHECKING:
     from kfgen.generate import Generated
-    from kfgen.logs import Log
     from kfgen.spec.types import Spec
 
 
@@ -59,7 +58,7 @@ class Built:
     help="Write nothing; exit 1 with a unified diff when the files on disk are not what would be written.",
 )  # fmt: skip
 @click.option(
-    "--log", type=click.Path(path_type=Path), metavar="LOG.csv",
+    "--log", "--ranges", "log", type=click.Path(path_type=Path), metavar="LOG.csv",
     help="A log whose ranges a fixed-point filter is to hold, beside those of simulated runs.",
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Also write over files that were edited by hand, or are not kfgen's.")
@@ -128,7 +127,7 @@ def generate_all(
         for done, spec in enumerate(specs):
             advance(done, spec.name)
             try:
-                generated = generate(spec, log=_read(log, spec))
+                generated = generate(spec, log=read_ranges(log, spec))
                 texts = dict(generated.files)
                 if selftest:
                     from kfgen.selftest import selftest as recorded
@@ -162,15 +161,6 @@ def _package(spec: Spec, generated: Generated, texts: Mapping[str, str], layout:
         run_time=declared.takes("predict", "dt"),
         takes_inputs=tuple(name for name in functions if declared.takes(name, "u")),
     )
-
-
-def _read(log: Path | None, spec: Spec) -> Log | None:
-    """The log that fixed point takes ranges from; other scalars have no use for one."""
-    if log is None or not is_fixed(spec.scalar):
-        return None
-    from kfgen.logs import read
-
-    return read(log, spec)
 
 
 def changed(files: Mapping[Path, str], force: bool) -> dict[Path, str]:

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kfgen.commands.options import example, load_spec, quiet_option, scalar_option, spec_argument, tell_advice
+from kfgen.commands.options import (
+    example,
+    load_spec,
+    quiet_option,
+    ranges_option,
+    read_ranges,
+    scalar_option,
+    spec_argument,
+    tell_advice,
+)
 from kfgen.commands.tables import Part, Table, Verdict, show
 
 if TYPE_CHECKING:
@@ -21,8 +30,9 @@ if TYPE_CHECKING:
 )
 @spec_argument
 @scalar_option
+@ranges_option
 @quiet_option
-def check(spec: Path, scalar: str | None, quiet: bool) -> None:
+def check(spec: Path, scalar: str | None, ranges: Path | None, quiet: bool) -> None:
     """Compile what would be emitted and hold it against the numpy reference on a random track.
 
     Prints the largest error of x (in standard deviations) and of P (relative to sqrt(P_ii P_jj)) and the
@@ -30,11 +40,13 @@ def check(spec: Path, scalar: str | None, quiet: bool) -> None:
     fixed point; and where a float of a state's size resolves no tenth of its standard deviation in 8 roundings.
     """
     from kfgen.check import check as compare
+    from kfgen.generate import build as generate
 
     loaded = load_spec(spec, scalar)
     if not quiet:
         tell_advice(loaded)
-    outcome = compare(loaded)
+    log = read_ranges(ranges, loaded)
+    outcome = compare(loaded, generated=None if log is None else generate(loaded, log=log))
     show(*report(outcome))
     sys.exit(0 if outcome.passed else 1)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kfgen.commands.options import example, load_spec, scalar_option, spec_argument
+from kfgen.commands.options import example, load_spec, ranges_option, read_ranges, scalar_option, spec_argument
 from kfgen.commands.progress import progress
 from kfgen.commands.tables import Part, Table, show
 
@@ -41,6 +41,7 @@ BUDGET_TARGET = "cortex-m4f"  # what the budgets of a spec are for
 @click.option("--compiler", type=click.Choice(["gcc", "zig"]), help="In place of the preferred one that is installed.")
 @click.option("--cflags", metavar="FLAGS", default="", help="Further options of the compiler.")
 @scalar_option
+@ranges_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def cost(
     spec: Path,
@@ -51,6 +52,7 @@ def cost(
     compiler: str | None,
     cflags: str,
     scalar: str | None,
+    ranges: Path | None,
     as_json: bool,
 ) -> None:
     """Cross-compile a filter and run it in an emulator over a log; no board is needed.
@@ -77,7 +79,7 @@ def cost(
         advance(0, "log")
         data = simulate(loaded, rows) if log is None else logs.read(log, loaded)
         advance(1, "filter")
-        generated = build(loaded, judge=False)
+        generated = build(loaded, log=read_ranges(ranges, loaded), judge=False)
         advance(2, "measuring")
         plain = measure(generated, data, target, cflags.split(), compiler=compiler, rows=rows)
         found = {"measured": plain}

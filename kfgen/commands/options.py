@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 import click
 
 from kfgen.errors import KfgenError
+from kfgen.scalar_names import is_fixed
 
 if TYPE_CHECKING:
     from kfgen.generate import Generated
+    from kfgen.logs import Log
     from kfgen.spec.types import Spec
 
 spec_argument = click.argument("spec", type=click.Path(path_type=Path), metavar="SPEC")
@@ -21,6 +23,19 @@ scalar_option = click.option(
     metavar="S",
     help="float, double or q<m>.<n> (such as q16.16) in place of the spec's own scalar.",
 )
+ranges_option = click.option(
+    "--ranges", "ranges", type=click.Path(path_type=Path), metavar="LOG.csv",
+    help="The log that `kfgen build --log` was given, whose ranges a fixed-point filter holds.",
+)  # fmt: skip
+
+
+def read_ranges(path: Path | None, spec: Spec) -> Log | None:
+    """The log that fixed point takes ranges from; other scalars have no use for one."""
+    if path is None or not is_fixed(spec.scalar):
+        return None
+    from kfgen.logs import read
+
+    return read(path, spec)
 
 
 quiet_option = click.option("--quiet", is_flag=True, help="No advice on what a spec may not mean.")

@@ -10,7 +10,15 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.commands.options import example, keep_apart, load_spec, scalar_option, spec_argument
+from kfgen.commands.options import (
+    example,
+    keep_apart,
+    load_spec,
+    ranges_option,
+    read_ranges,
+    scalar_option,
+    spec_argument,
+)
 from kfgen.commands.progress import progress
 from kfgen.commands.tables import Table, on_terminal, show
 from kfgen.scalar_names import FLOAT
@@ -36,7 +44,16 @@ LONG = 200_000
 @click.option("--plot", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the estimates.")
 @click.option("--any-rate", is_flag=True, help="With a fixed dt: run a log whose steps are others all the same.")
 @scalar_option
-def run(spec: Path, log: Path, out: Path | None, plot: Path | None, any_rate: bool, scalar: str | None) -> None:
+@ranges_option
+def run(
+    spec: Path,
+    log: Path,
+    out: Path | None,
+    plot: Path | None,
+    any_rate: bool,
+    scalar: str | None,
+    ranges: Path | None,
+) -> None:
     """Run the compiled filter over a log with the columns t, <input>, <sensor>.<component>.
 
     An empty cell is no measurement; a sensor with only some of its components is not updated, unless it is
@@ -63,7 +80,7 @@ def run(spec: Path, log: Path, out: Path | None, plot: Path | None, any_rate: bo
         click.echo(f"kfgen: ignored columns of {log}: {logs.listed(data.ignored)}", err=True)
     if fixed_step(loaded) and not any_rate:
         logs.check_rate(data, fixed_step(loaded))
-    kf = native.compile(loaded)
+    kf = native.compile(loaded, log=read_ranges(ranges, loaded))
     with progress(data.rows, data.rows >= LONG) as advance:
         result = kf.run(data, lambda done, rows: advance(done, "running"))
     _report(result)

@@ -116,7 +116,8 @@ def _steps(spec: Spec, declared: Declarations, log: Log) -> list[Step]:
             last = first + len(sensor.components)
             bits, full = int(work.mask[row, i]), (1 << (last - first)) - 1
             if bits:
-                z = {f"z_{sensor.name}": scalar.to_raw(work.z[row, first:last], units.z[sensor.name])}
+                given = scalar.near(work.z[row, first:last], units.z_periods[sensor.name])
+                z = {f"z_{sensor.name}": scalar.to_raw(given, units.z[sensor.name])}
                 if bits == full:
                     steps.append(Step(f"update_{sensor.name}", {**u, **z}))
                 else:

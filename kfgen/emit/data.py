@@ -15,6 +15,7 @@ class Named:
     comment: str = ""
     value: str = ""
     index_name: str = ""
+    period: str = ""  # of fixed point: after which the quantity repeats
 
 
 @dataclass(frozen=True)

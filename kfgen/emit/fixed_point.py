@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 
 from kfgen.emit.data import Named, Routines
 from kfgen.ir.program import Call, Function, roots, walk
@@ -26,11 +26,13 @@ class FixedPoint:
     floor: bool
     closure: Callable[[Iterable[str], bool], tuple[str, ...]]
     tables: object
+    periods: Mapping[str, float] = field(default_factory=dict)  # macro's name -> after which the quantity repeats
 
 
 def units(fixed: FixedPoint) -> tuple[Named, ...]:
-    """Quantity -> the value of raw 1, as a C literal."""
-    return tuple(Named(name, value=repr(2.0**e)) for name, e in fixed.units)
+    """Quantity -> the value of raw 1, and its period where it has one, as C literals."""
+    periods = {name: repr(period) for name, period in fixed.periods.items()}
+    return tuple(Named(name, value=repr(2.0**e), period=periods.get(name, "")) for name, e in fixed.units)
 
 
 def routines(fixed: FixedPoint, helpers: Iterable[str]) -> Routines:

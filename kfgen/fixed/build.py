@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from kfgen.emit.fixed_point import FixedPoint
+from kfgen.errors import SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic import tables
 from kfgen.fixed.arithmetic.routines import closure
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.formats.choose import choose
 from kfgen.fixed.formats.formats import Formats
-from kfgen.fixed.formats.report import table, units
+from kfgen.fixed.formats.report import periods, table, units
 from kfgen.fixed.linear import linear
 from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
 from kfgen.fixed.program.unroll import unrolled
+from kfgen.fixed.ranges.box import Box
+from kfgen.fixed.ranges.drive import Drive, Seen
+from kfgen.fixed.ranges.intervals import Intervals, spread
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
+from kfgen.fixed.ranges.recorder import Recorder, unknown
 from kfgen.fixed.ranges.runs import Runner
 from kfgen.fixed.ranges.survey import survey
 from kfgen.fixed.ranges.weather import Weather
 from kfgen.fixed.trial.certificate import Certificate, certify, lines
-from kfgen.fixed.trial.judge import judge
+from kfgen.fixed.trial.integers import IntegerProgram
+from kfgen.fixed.trial.judge import hear, judge, refuse
+from kfgen.fixed.trial.tour import ShakenTour, Tour
+from kfgen.ir.nodes import Node
 from kfgen.logs import Log
+
+WIDER = 2.0**6  # times what runs have met: an interval that is wider than that has overrated its value
+DRIVEN, TRIED = 21, 31  # seeds of the runs over the box
+LEGS, ROWS = 8, 12  # of the trial
 
 
 @dataclass(frozen=True)
@@ -35,22 +48,128 @@ class FixedFilter:
     formats: Formats
     certificates: tuple[Certificate, ...]  # of its functions
     view: FixedPoint
+    widest: Mapping[str, Seen] = field(default_factory=dict)  # how far the runs over the declared box have gone
+    told: tuple[str, ...] = ()  # where in the box the filter has not been held
 
     def certified(self) -> tuple[str, ...]:
         """The certificates as a table."""
-        return lines(self.certificates)
+        widest = {name: (seen.low, seen.high) for name, seen in self.widest.items()}
+        return *lines(self.certificates, widest), *self.told
 
 
-def build_fixed(code: FilterCode, scalar: Fixed, log: Log | None = None) -> FixedFilter:
-    """Scale and lower a filter. log: runs beside the simulated ones. Raises SpecError where ranges do not fit."""
-    real = replace(code, functions=tuple(unrolled(f, code.constants) for f in code.functions))
-    functions = list(real.functions)
-    arrays, ranges = find_arrays(functions), Ranges()
-    program, weather, constant = RealProgram(functions, arrays, ranges), Weather(real), linear(real)
-    pace = survey(Runner(real, program, ranges), weather, log, constant)
-    formats = choose(real, arrays, ranges, scalar.bits, constant, weather.process_noise(), pace)
-    lowered = lower(real, formats)
-    found = judge(program, real, lowered, formats, scalar, weather)
-    view = FixedPoint(scalar.bits, units(lowered, formats), table(formats), scalar.rounding == "floor", closure,
-                      tables)  # fmt: skip
-    return FixedFilter(lowered, real, formats, certify(lowered.functions, found.peaks), view)
+def build_fixed(code: FilterCode, scalar: Fixed, logs: Sequence[Log] = ()) -> FixedFilter:
+    """Scale and lower a filter. logs: runs beside the simulated ones. Raises SpecError where ranges do not fit."""
+    return _Builder(code, scalar, logs).build()
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the declared box: that where no variance is beyond its limit; none: all of it.
+
+    spare: bits of further head-room for covariances, for corners that no run has been in.
+    """
+
+    box: Box
+    limits: Sequence[float] = ()
+    spare: int = 0
+
+
+def _less(part: Part, reason: SpecError) -> tuple[str, ...]:
+    """What is said of a filter that holds in a part of its box only."""
+    where = "where a standard deviation is within half of its state's range"
+    if not any(part.box.states):
+        where += ", and states near where the model itself leads"
+    return (f"holds {where}, not in all of the declared ranges: {reason.mistakes[0].message}",)
+
+
+@dataclass(frozen=True)
+class _Lowered:
+    """Integers, their formats, and a program that runs them."""
+
+    code: FilterCode
+    formats: Formats
+    program: IntegerProgram
+
+
+class _Builder:
+    """Tries formats for the whole box first, then for less of it."""
+
+    def __init__(self, code: FilterCode, scalar: Fixed, logs: Sequence[Log]) -> None:
+        self.scalar = scalar
+        self.real = replace(code, functions=tuple(unrolled(f, code.constants) for f in code.functions))
+        self.functions = list(self.real.functions)
+        self.arrays, self.ranges = find_arrays(self.functions), Ranges()
+        self.program = RealProgram(self.functions, self.arrays, self.ranges)
+        self.weather = Weather(self.real)
+        self.box = self.weather.box
+        self.linear = linear(self.real)
+        self.runner = Runner(self.real, self.program, self.ranges)
+        self.pace = survey(self.runner, self.weather, logs, self.linear)
+        self.met = self.ranges.copy()
+        self.sizes: Mapping[Node, float] = {}
+
+    def build(self) -> FixedFilter:
+        if not self.box.wide:
+            found = self._lowered(0)
+            self._judged(found)
+            return self._filter(found)
+        refusals: list[SpecError] = []
+        box, known = self.box, unknown(self.box)
+        for part in (Part(box, spare=1), Part(box), Part(box, known), Part(box.without_states(), known)):
+            self.ranges.restore(self.met)
+            drive = Drive(self.weather, part.box)
+            self._see(drive, part)
+            try:
+                made = self._toured(drive, part)
+            except SpecError as error:
+                refusals.append(error)
+            else:
+                return made if not part.limits else replace(made, told=(*made.told, *_less(part, refusals[0])))
+        raise refusals[0]
+
+    def _see(self, drive: Drive, part: Part) -> None:
+        """Runs over a part of the box, and what intervals say of it."""
+        drive.run(Recorder(self.runner, self.box, part.limits), DRIVEN)
+        intervals = Intervals(self.real.model, part.box, self.ranges)
+        intervals.read(self.functions)
+        self.sizes = intervals.sizes
+        spread(intervals, WIDER)
+
+    def _toured(self, drive: Drive, part: Part) -> FixedFilter:
+        """A filter that has been tried all over a part; what its trial has met counts where something saturated."""
+        for last in (False, True):
+            met = self._lowered(part.spare)
+            try:
+                self._judged(met)
+            except SpecError:
+                if last:  # what the first one was short of costs more than there is
+                    break
+                raise
+            found = met
+            tour = Tour(self.program, found.program, self.real, found.formats, found.code, self.box, part.limits)
+            drive.run(tour, TRIED, LEGS, ROWS)
+            if last or not tour.found.saturated:
+                break
+        if not tour.found.carried:
+            shaken = ShakenTour(self.program, self.real, found.formats, self.box, part.limits)
+            drive.run(shaken, TRIED, LEGS, ROWS)
+            refuse(tour.found, shaken.found, self.real, found.formats, self.scalar)
+        return replace(self._filter(found), widest=dict(drive.seen))
+
+    def _lowered(self, spare: int) -> _Lowered:
+        hear(self.real.model.spec, self.runner.heard)
+        noise = self.weather.process_noise()
+        formats = choose(self.real, self.arrays, self.ranges, self.scalar.bits, self.linear, noise, self.pace,
+                         self.sizes, spare)  # fmt: skip
+        code = lower(self.real, formats)
+        return _Lowered(code, formats, IntegerProgram(list(code.functions), self.arrays, self.scalar))
+
+    def _judged(self, found: _Lowered) -> None:
+        judge(self.program, self.real, found.program, found.code, found.formats, self.scalar, self.weather)
+
+    def _filter(self, found: _Lowered) -> FixedFilter:
+        """What is handed on."""
+        view = FixedPoint(self.scalar.bits, units(found.code, found.formats), table(found.formats),
+                          self.scalar.rounding == "floor", closure, tables, periods(self.real.model))  # fmt: skip
+        certificates = certify(found.code.functions, found.program.peaks, found.formats.fitting)
+        return FixedFilter(found.code, self.real, found.formats, certificates, view)

@@ -11,6 +11,7 @@ import cffi
 
 from kfgen.emit.declarations import Declarations
 from kfgen.errors import KfgenError
+from kfgen.logs import Source, as_log
 from kfgen.native import driver
 from kfgen.native.compiler import build
 from kfgen.native.emitted import Emitted
@@ -18,6 +19,7 @@ from kfgen.native.filter import NativeFilter
 from kfgen.native.run import RunResult
 from kfgen.native.struct import Struct
 from kfgen.override import override
+from kfgen.scalar_names import is_fixed
 from kfgen.spec.types import Spec
 
 __all__ = ["Emitted", "NativeFilter", "RunResult", "compile", "compile_many", "load_filters"]
@@ -26,15 +28,21 @@ SpecOrPath = Spec | str | os.PathLike[str]
 
 
 def compile(
-    spec: SpecOrPath, scalar: str | None = None, *, flags: Sequence[str] | None = None, **overrides: Any
+    spec: SpecOrPath,
+    scalar: str | None = None,
+    *,
+    flags: Sequence[str] | None = None,
+    log: Source | None = None,
+    **overrides: Any,
 ) -> NativeFilter:
     """The compiled filter of a spec or of the path of one.
 
     scalar: float, double or q<m>.<n> in place of the spec's own. flags: options of the C compiler in place of
-    `-O2`. overrides: other fields of the spec, see `kfgen.override.override`. Raises SpecError for a wrong
-    spec and KfgenError where there is no C compiler. What was built before is taken from the cache.
+    `-O2`. log: what a q scalar takes its ranges from, beside simulated runs, as `kfgen build --log` does.
+    overrides: other fields of the spec, see `kfgen.override.override`. Raises SpecError for a wrong spec and
+    KfgenError where there is no C compiler. What was built before is taken from the cache.
     """
-    return compile_many([spec], scalar, flags=flags, **overrides)[0]
+    return compile_many([spec], scalar, flags=flags, log=log, **overrides)[0]
 
 
 def compile_many(
@@ -42,6 +50,7 @@ def compile_many(
     scalar: str | None = None,
     *,
     flags: Sequence[str] | None = None,
+    log: Source | None = None,
     **overrides: Any,
 ) -> list[NativeFilter]:
     """The compiled filters of many specs, built into one library by one call of the compiler.
@@ -56,7 +65,7 @@ def compile_many(
     for each in specs:
         spec = _renamed(override(_loaded(each), scalar, **overrides), taken)
         taken.add(spec.name.upper())
-        filters.append(generate(spec))
+        filters.append(generate(spec, log=as_log(log, spec) if log is not None and is_fixed(spec.scalar) else None))
     return load_filters(filters, flags=flags)
 
 

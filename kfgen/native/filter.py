@@ -72,7 +72,9 @@ class NativeFilter:
         values = row(z, components, f"z of {sensor!r}")
         if bits is not None:
             values = np.where([bits >> i & 1 for i in range(len(components))], values, 0.0)
-        arguments = [self.struct.record(sensor, values, self.struct.units.z[sensor])]
+        units = self.struct.units
+        values = self.struct.value.near(values, units.z_periods[sensor])
+        arguments = [self.struct.record(sensor, values, units.z[sensor])]
         if self._takes(function, "u", u, "inputs", bool(self.inputs)):
             arguments.append(self._inputs(u))
         if bits is not None:
@@ -81,7 +83,7 @@ class NativeFilter:
 
     def set_state(self, x: ArrayLike) -> int:
         """Replace the state [n]; the covariance stays."""
-        new = shaped(x, (len(self.states),), "x")
+        new = self.struct.value.near(shaped(x, (len(self.states),), "x"), self.struct.units.x_periods)
         return self.struct.call("set_state", self.struct.array(new, self.struct.units.x))
 
     def set_covariance(self, P: ArrayLike) -> int:

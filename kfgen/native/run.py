@@ -138,7 +138,7 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         "dt": scalar.to_raw(work.dt, units.dt),
         "u": scalar.to_raw(work.u, units.u),
         "mask": work.mask.copy(),
-        "z": scalar.to_raw(work.z, units.readings),
+        "z": scalar.to_raw(scalar.near(work.z, units.reading_periods), units.readings),
         "x": np.zeros((rows, n), scalar.dtype),
         "rest": np.zeros((rows, len(struct.compensated)), scalar.dtype),
         "var": np.zeros((rows, n), scalar.dtype),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 
 from kfgen.emit.declarations import Declarations
 from kfgen.errors import KfgenError
+from kfgen.spec.constants import value as constant
+from kfgen.spec.tree import Expression
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -36,6 +39,10 @@ class Value(ABC):
 
     @abstractmethod
     def to_raw(self, values: Array, unit: Array | float) -> NDArray[Any]: ...
+
+    def near(self, values: Array, periods: Array) -> Array:
+        """Values of quantities that repeat after `periods` (infinite: they do not), where the type can carry them."""
+        return values
 
     @abstractmethod
     def to_physical(self, raw: NDArray[Any], unit: Array | float) -> Array: ...
@@ -91,6 +98,14 @@ class Fixed(Value):
         clipped: Array = np.clip(scaled, -(2.0**31), 2.0**31 - 1)
         return clipped.astype(np.int32)
 
+    def near(self, values: Array, periods: Array) -> Array:
+        """Within half a period of 0, to which a format of limited size would cut them off otherwise."""
+        values = np.asarray(values, dtype=np.float64)
+        repeating = np.isfinite(values) & np.isfinite(periods)
+        period = np.where(repeating, periods, 1.0)
+        turns = np.where(repeating, np.rint(np.where(repeating, values, 0.0) / period), 0.0)
+        return np.asarray(values - period * turns)
+
     def to_physical(self, raw: NDArray[Any], unit: Array | float) -> Array:
         return np.asarray(raw).astype(np.float64) * unit
 
@@ -113,9 +128,20 @@ class Units:
             sensor.name: np.array([value.unit(f"{sensor.name}_{each.name}") for each in sensor.components])
             for sensor in spec.measurements
         }
+        self.x_periods = np.array([_period(state.period, spec) for state in spec.states])
+        self.z_periods: dict[str, Array] = {
+            sensor.name: np.array([_period(each.period, spec) for each in sensor.components])
+            for sensor in spec.measurements
+        }
+        self.reading_periods: Array = np.concatenate([np.empty(0), *self.z_periods.values()])
         self.readings: Array = np.concatenate([np.empty(0), *self.z.values()])  # all sensors' z, one after the other
         self.R: dict[str, Array] = {name: np.outer(z, z) / value.one for name, z in self.z.items()}
         self.parameters = {each.name: value.unit(each.name) for each in spec.parameters}
         run_time = spec.dt is not None and spec.dt.run_time
         self.dt = value.unit("dt") if run_time else 1.0
         self.one = value.one
+
+
+def _period(period: Expression | None, spec: Spec) -> float:
+    """After which a quantity repeats; infinite where it does not."""
+    return math.inf if period is None else float(constant(period.tree, spec))

@@ -15,6 +15,7 @@ from kfgen.spec.shapes import (
     Reference,
     Shape,
     Table,
+    Text,
     Whole,
 )
 
@@ -237,6 +238,12 @@ FIXED = Record(
         ),
         Key("rounding", Choice(("nearest", "floor")), "How products are rounded.", "nearest"),
         Key("overflow", Choice(("saturate",)), "Values saturate, with the flag SATURATED.", "saturate"),
+        Key(
+            "log",
+            Text(),
+            "A log, by its path from the spec's folder, whose ranges count beside those of simulated runs, whatever is "
+            "done with the filter.",
+        ),
     ),
 )
 

@@ -205,6 +205,8 @@ class Fixed:
     scale: Mapping[str, Expression] | None = None  # None: auto
     rounding: str = "nearest"
     overflow: str = "saturate"
+    log: str | None = None  # a path, relative to the spec
+    log_place: Place = NOWHERE
 
 
 @dataclass(frozen=True)

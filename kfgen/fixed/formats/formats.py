@@ -6,6 +6,7 @@ Of what is not chosen: from the largest value of the runs with HEADROOM bits abo
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from kfgen.fixed.arithmetic.limits import BITS, OUTSIDE
@@ -53,9 +54,12 @@ class Formats:
     ranges: Ranges
     bits: int  # n of q<m>.<n>
     more: int = 0  # further head-room
+    spare: int = 0  # that of covariances
     fixed: dict[Cell, int] = field(default_factory=dict)
     report: list[Quantity] = field(default_factory=list)
     carried: dict[Cell, int] = field(default_factory=dict)  # cells with digits below their LSB -> place in kf.rest
+    sizes: Mapping[Node, float] = field(default_factory=dict)  # what no value exceeds anywhere in the declared box
+    fitting: dict[int, Node] = field(default_factory=dict)  # operations, by id, of which that shows that they fit
 
     def of(self, cell: Cell) -> int | None:
         """The exponent of a cell; None where the runs have told nothing."""
@@ -65,7 +69,8 @@ class Formats:
             if largest == 0:
                 return None
             covariance = cell[0] == "array" and plain(str(cell[1])) in ("kf.D", "kf.P")
-            found = self.fixed[cell] = exponent(largest, COVARIANCE if covariance else HEADROOM + self.more)
+            kept = COVARIANCE + self.spare if covariance else HEADROOM + self.more
+            found = self.fixed[cell] = exponent(largest, kept)
         return found
 
     def node(self, node: Node, headroom: int = PASSING) -> int | None:

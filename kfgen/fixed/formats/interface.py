@@ -104,7 +104,9 @@ class Interface:
         declared = max(self._limit(state.range), self._limit(state.bounds), float(self.model.periods[i] or 0) / 2)
         variance = self._variance(i)
         # P_ii has the LSB 2^(2 e + n) outside, and has to fit there too
-        least = math.ceil((above(variance) + 1 - OUTSIDE - self.f.bits) / 2) if variance else None
+        # where gains depend on the data, so do variances; those of a bank grow with what its modes differ by
+        room = 1 + (self.f.more if self.f.spare or self.code.modes else 0)
+        least = math.ceil((above(variance) + room - OUTSIDE - self.f.bits) / 2) if variance else None
         if self.model.periods[i] is not None:  # wrapped before it is stored
             self.f.ranges.see(cell, float(self.model.periods[i] or 0) / 2)
         return self._quantity(cell, state.name, declared, HEADROOM + 1, least, "so that its variance fits")
@@ -118,7 +120,10 @@ class Interface:
         cell = ("number", f"update_{model.name}", f"z.{c.name}")
         declared = max(self._limit(c.range), float(model.periods[k] or 0) / 2)
         names = list(self.model.states)
+        least, most = None, ""
         if str(model.h[k]) in names:  # it reads a state: its range is that state's
             i = names.index(str(model.h[k]))
             declared = max(declared, self._limit(self.spec.states[i].range))
-        return self._quantity(cell, f"{model.name}.{c.name}", declared, HEADROOM + 1)
+            if self.code.modes and not declared:
+                least, most = self.f.fixed[self.f.arrays.state(i)], "as the state that it reads"
+        return self._quantity(cell, f"{model.name}.{c.name}", declared, HEADROOM + 1, least, most)

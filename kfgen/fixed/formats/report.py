@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.formats.formats import Formats
+from kfgen.model import Model
 
 
 def units(code: FilterCode, formats: Formats) -> tuple[tuple[str, int], ...]:
@@ -19,6 +20,15 @@ def units(code: FilterCode, formats: Formats) -> tuple[tuple[str, int], ...]:
     if spec.dt is not None and spec.dt.run_time:
         out.append(("dt", ("number", "dt")))
     return tuple((name.upper(), formats.fixed[cell]) for name, cell in out)
+
+
+def periods(model: Model) -> dict[str, float]:
+    """Name of an angle, or of what else repeats -> its period."""
+    found = dict(zip(model.states, model.periods, strict=True))
+    for sensor in model.sensors:
+        names = (f"{sensor.name}_{c.name}" for c in sensor.spec.components)
+        found |= dict(zip(names, sensor.periods, strict=True))
+    return {name.upper(): float(period) for name, period in found.items() if period is not None}
 
 
 def table(formats: Formats) -> tuple[str, ...]:

@@ -204,7 +204,11 @@ class Carry:
 
     def _gathered(self, total: Node, a: Raw, b: Raw, e: int) -> Node:
         s = e - a.e - b.e
-        if s < 0:
+        if -CARRIED <= s < 0 and a.size << -s > LIMIT and a.node.constant is None and b.node.constant is None:
+            # in the cell's own format it fits where the cell does; shifted by so much, a factor may not
+            a = self.x.scaled_product(a, b, e + CARRIED)
+            b = Raw(constant(ONE), -CARRIED, ONE, ONE)
+        elif s < 0:
             a = self.x.at(a, a.e + s)
         elif s > 62:
             a = self.x.at(a, a.e + s - 62)

@@ -8,9 +8,10 @@ from kfgen.fixed.arithmetic.limits import BITS, LIMIT
 from kfgen.fixed.arithmetic.rounding import nearest, size_of
 from kfgen.fixed.lowering.raw import QTable, Raw
 from kfgen.fixed.lowering.sums import Sums
-from kfgen.fixed.program.nodes import make, same, terms
+from kfgen.fixed.program.nodes import integer, make, same, terms
 from kfgen.ir.nodes import Node
 
+COARSEST = 8  # bits of half a period, at least
 _UNARY = {"sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh"}
 
 
@@ -38,7 +39,9 @@ class Functions(Sums):
                 return Raw(make("q_sign", (a.node,)), 0, -1, 1)
             case "wrap":
                 a = self.value(node.args[0])
-                a = self.at(a, max(a.e, size_of(node.data / 2) - 30))  # half a period, to 32 bits more, is an int64_t
+                # half a period, to 32 bits more, is an int64_t; and it has some digits, whatever the runs have met
+                size = size_of(node.data / 2)
+                a = self.at(a, min(max(a.e, size - 30), size - COARSEST))
                 half = nearest(node.data / 2, a.e - 32)
                 most = min(half >> 32, LIMIT)
                 return Raw(make("q_wrap", (a.node,), (half,)), a.e, -most, most)
@@ -65,7 +68,8 @@ class Functions(Sums):
             out = max(out, -29)
             return Raw(make("q_atan2", (a.node, b.node), (-out,)), out)
         if op == "pow":
-            return Raw(make("q_pow", (a.node, b.node), (-a.e, -b.e, -out)), out)
+            # the routine's order: each number is followed by its fraction bits
+            return Raw(make("q_pow", (a.node, integer(-a.e), b.node, integer(-b.e)), (-out,)), out)
         raise NotImplementedError(op)
 
     def root(self, node: Node, e: int | None) -> Raw:

@@ -12,6 +12,8 @@ from kfgen.fixed.lowering.raw import FIRST, LAST, ROOMIER, USEFUL, Raw, interval
 from kfgen.fixed.program.nodes import constant, make, terms
 from kfgen.ir.nodes import Node
 
+NOTHING = 8  # bits below what a quotient has a use for: a value that is so small is zero but for round-off
+
 
 class Products(Quotients):
     """Lowers products."""
@@ -78,6 +80,10 @@ class Products(Quotients):
         if self.small(a) and self.small(b) and FIRST <= s <= LAST:
             return Raw(make("q_mac", args, (s,)), e, max(low, -INSIDE), min(high, INSIDE))
         return Raw(make("q_mul", (a.node, b.node), (s,)), e, max(low, -LIMIT), min(high, LIMIT))
+
+    def scaled_product(self, a: Raw, b: Raw, e: int) -> Raw:
+        """a b at e, which is no finer than the product is."""
+        return self._mul(a, b, e - a.e - b.e, e)
 
     def _within(self, a: Raw, b: Raw, s: int, most: int | None) -> tuple[Raw, Raw, int, int | None]:
         """Factors of which one has so few digits that s is at most LAST: it costs 1/8 of the product's LSB."""
@@ -173,7 +179,7 @@ class Products(Quotients):
             case "mul":
                 a, b = self.constant_first(node.args)
                 if self._special(a, b):
-                    return None
+                    return self._finest(node, a, b)
                 if a.constant is not None:
                     inner = self.digits(b)
                     return None if inner is None or a.constant == 0 else inner + size_of(a.constant) - 4
@@ -187,6 +193,17 @@ class Products(Quotients):
             case "variable" if node.data in self.c.inverses or node.data in self.c.ratios:
                 return None
         return self.value(node).e
+
+    def _finest(self, node: Node, a: Node, b: Node) -> int | None:
+        """The finest exponent that a division of one by what the other is the reciprocal of has a use for, where runs
+        have shown nothing but round-off of it."""
+        if self._inverse_of(a) is not None:
+            a, b = b, a
+        inverse = self._inverse_of(b)
+        if inverse is None or a.constant is not None or self._special(a):
+            return None
+        finest, natural = self.finest(self.value(a), inverse[0]), self.natural(node)
+        return finest if natural is not None and finest > natural + NOTHING else None
 
     def roomier(self, node: Node, e: int | None) -> int | None:
         """An exponent a little coarser at which a product is proved to fit, if there is one."""

@@ -19,10 +19,14 @@ class Quotients(Values):
         a, b = node.args
         den = self.value(b)
         if fine and e is not None and a.constant is None:
-            e = max(e, self.value(a).e - den.e - BITS - 3)
+            e = max(e, self.finest(self.value(a), den))
         if e is None:
             e = (0 if a.constant is not None else self.value(a).e) - den.e - BITS // 2
         return self._divided(self.value(a), den, e)
+
+    def finest(self, a: Raw, b: Raw) -> int:
+        """The finest exponent that a / b has a use for: its last digit is of what the last one of a makes."""
+        return a.e - b.e - BITS - 3
 
     def _divided(self, a: Raw, b: Raw, e: int) -> Raw:
         """a / b at e."""

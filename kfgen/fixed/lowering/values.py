@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
 from kfgen.fixed.arithmetic.limits import BITS, FINE, INSIDE, LEAST, LIMIT
 from kfgen.fixed.arithmetic.rounding import nearest, power, rounded, size_of
+from kfgen.fixed.formats.formats import SLACK
 from kfgen.fixed.lowering.raw import Context, Raw
 from kfgen.fixed.program.cells import is_variance
 from kfgen.fixed.program.nodes import constant, make, same, terms
@@ -30,9 +32,24 @@ class Values:
     def value(self, node: Node, e: int | None = None) -> Raw:
         """A real expression in the format that suits it, or in that of exponent e."""
         raw = self._value(node, e)
+        self._proved(node, raw)
         if raw.low < 0 and node.op in ("sum", "mul", "div", "select", "sqrt") and self.nonnegative(node):
             raw = replace(raw, low=0)
         return raw if e is None else self.at(raw, e)
+
+    def _proved(self, node: Node, raw: Raw) -> None:
+        """Note the operations of a value that fit anywhere in the declared box, whatever their intervals allow."""
+        largest = self.c.formats.sizes.get(node)
+        if largest is None or not 0 < SLACK * largest < math.ldexp(INSIDE, raw.e):
+            return
+        waiting = [raw.node, *([] if raw.clipped is None else [raw.clipped])]
+        while waiting:  # a sum is a chain of operations in one format, which begins with the sum so far
+            op = waiting.pop()
+            if op.op in ("q_mac", "q_fma", "q_add", "q_sub", "q_fit", "add", "sub"):
+                self.c.formats.fitting[id(op)] = op
+                waiting.append(op.args[0])
+            elif op.op in ("q_mul", "q_shift"):
+                self.c.formats.fitting[id(op)] = op
 
     def seen(self, node: Node) -> bool:
         """Whether the runs have told the range of a value."""
@@ -106,7 +123,10 @@ class Values:
             return a
         if a.clipped is not None:
             return Raw(a.clipped, a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
-        return Raw(make("q_fit", (a.node,)), a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
+        node = make("q_fit", (a.node,))
+        if id(a.node) in self.c.formats.fitting:
+            self.c.formats.fitting[id(node)] = node
+        return Raw(node, a.e, max(a.low, -INSIDE), min(a.high, INSIDE))
 
     def together(self, nodes: Sequence[Node]) -> list[Raw]:
         """Values in one format: the finest in which all of them fit."""

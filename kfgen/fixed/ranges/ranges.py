@@ -8,6 +8,8 @@ from typing import Any
 
 HUGE = 1e30  # what is beyond has left the model
 
+Met = tuple[tuple[list[float], list[float], list[float]], list[int]]
+
 
 @dataclass
 class Ranges:
@@ -35,14 +37,17 @@ class Ranges:
             self.high[i] = max(self.high[i], value)
             self.low[i] = min(self.low[i], value)
 
-    def copy(self) -> tuple[list[float], ...]:
+    def copy(self) -> Met:
         """What has been met so far; for `restore`."""
-        return list(self.high), list(self.low), list(self.small)
+        return (list(self.high), list(self.low), list(self.small)), [len(v) for v in self.quotients.values()]
 
-    def restore(self, seen: tuple[list[float], ...]) -> None:
+    def restore(self, met: Met) -> None:
         """Forget what has been met since."""
+        seen, lengths = met
         for values, old, blank in zip((self.high, self.low, self.small), seen, (0.0, 0.0, HUGE), strict=True):
             values[:] = old + [blank] * (len(values) - len(old))
+        for values, length in zip(self.quotients.values(), lengths, strict=False):
+            del values[length:]
 
     def largest(self, key: Any) -> float:
         """The largest size met, 0 where nothing was."""

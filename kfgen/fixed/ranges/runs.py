@@ -40,6 +40,7 @@ class Runner:
         self.spec = code.model.spec
         self.names = {f.name for f in code.functions}
         self.run_time = self.spec.dt is not None and self.spec.dt.run_time
+        self.heard: set[str] = set()  # the sensors that have been read
         self.limits: list[float] = []  # of variances: an update that inflates one beyond its own is as if not made
 
     def run(self, log: Columns, rows: int, correlation: float = 0.0, every: int = 1,
@@ -70,13 +71,36 @@ class Runner:
                 continue
             for place, sensor in enumerate(self.spec.measurements):
                 if (k + place) % every == 0:
-                    self._limited(memory, sensor, log, k)
+                    self._limited(memory, sensor, readings(log, sensor, k), k)
             if every > 1 and rows - 2 * OUTAGE < 2 * k <= rows:
-                found = self._variances(memory)
+                found = self.variances(memory)
                 least = [min(pair) for pair in zip(least or found, found, strict=True)]
             if k % EVERY == 0 or k == rows - 1:
                 self._others(memory, k)
         return memory
+
+    def row(self, memory: Memory, inputs: Mapping[str, float], dt: float, readings: Mapping[str, Sequence[float]],
+            k: int) -> None:  # fmt: skip
+        """A prediction, and the update of every sensor. inputs, readings: by name. k: the row's number."""
+        for name, value in inputs.items():
+            memory.numbers[f"u.{name}"] = value
+            self.ranges.see(("number", f"u.{name}"), value)
+        if self.run_time:
+            memory.numbers["dt"] = dt
+            self.ranges.see(("number", "dt"), dt)
+        self.program.run("predict", memory)
+        self._look(memory)
+        for sensor in self.spec.measurements:
+            if sensor.name in readings:
+                self._limited(memory, sensor, readings[sensor.name], k)
+        if k % EVERY == 0:
+            self._others(memory, k)
+
+    def place(self, memory: Memory, x: Sequence[float]) -> None:
+        """Put the estimate to x (n)."""
+        memory.arrays["x"] = list(x)
+        self.program.run("set_state", memory)
+        self._look(memory)
 
     def _correlate(self, memory: Memory, correlation: float) -> None:
         if "set_covariance" not in self.names:
@@ -93,22 +117,23 @@ class Runner:
         self.program.run("set_covariance", memory)
         self._look(memory)
 
-    def _limited(self, memory: Memory, sensor: Sensor, log: Columns, k: int) -> None:
+    def _limited(self, memory: Memory, sensor: Sensor, values: Sequence[float], k: int) -> None:
         if not self.limits:
-            self._update(memory, sensor, log, k)
+            self._update(memory, sensor, values, k)
             return
         before, seen = memory.copy(), self.ranges.copy()
-        self._update(memory, sensor, log, k)
-        if any(new > limit for new, limit in zip(self._variances(memory), self.limits, strict=True)):
+        self._update(memory, sensor, values, k)
+        if any(new > limit for new, limit in zip(self.variances(memory), self.limits, strict=True)):
             self.ranges.restore(seen)
             memory.arrays, memory.numbers = before.arrays, before.numbers
 
     def _grown(self, memory: Memory, least: list[float]) -> bool:
         """Whether a variance has become so large in an outage that the state is as good as unknown."""
-        found = self._variances(memory)
+        found = self.variances(memory)
         return any(0 < old * GROWN < new for old, new in zip(least, found, strict=bool(least)))
 
-    def _variances(self, memory: Memory) -> list[float]:
+    def variances(self, memory: Memory) -> list[float]:
+        """P_ii (n); 0 where the filter does not say."""
         n = len(self.code.model.states)
         return self.program.variances(memory, n) if "get_covariance" in self.names else [0.0] * n
 
@@ -135,11 +160,11 @@ class Runner:
         self.ranges.see(("number", "dt"), step)
         return step != 0
 
-    def _update(self, memory: Memory, sensor: Sensor, log: Columns, k: int) -> None:
-        values = readings(log, sensor, k)
+    def _update(self, memory: Memory, sensor: Sensor, values: Sequence[float], k: int) -> None:
         there = [not math.isnan(v) for v in values]
         if not any(there):
             return
+        self.heard.add(sensor.name)
         name = f"update_{sensor.name}"
         for c, v, known in zip(sensor.components, values, there, strict=True):
             memory.numbers[f"z.{c.name}"] = v if known else 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.pace import Pace
 from kfgen.fixed.ranges.runs import Runner
@@ -15,12 +17,12 @@ LONG = 2000  # of a filter whose covariance does not depend on the data: to its 
 INFLATED = 2.0**22  # times a usual variance: what `adaptive` may make of it, or the usual one has no digits left
 
 
-def survey(runner: Runner, weather: Weather, log: Log | None, linear: bool) -> Pace:
+def survey(runner: Runner, weather: Weather, logs: Sequence[Log], linear: bool) -> Pace:
     """Make them; what the steps of the nominal run changed.
 
-    log: further runs of the user's. linear: the covariance does not depend on the data.
+    logs: further runs of the user's. linear: the covariance does not depend on the data.
     """
-    if log is not None:
+    for log in logs:
         runner.run({name: list(column) for name, column in log.columns.items()}, log.rows)
     pace = _nominal(runner, weather, LONG if linear else STEPS)
     if any(options.inflation is not None for options in runner.code.model.every_options):

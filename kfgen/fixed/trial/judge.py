@@ -3,40 +3,99 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
-from kfgen.errors import SpecError
+from kfgen.errors import Mistake, SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.formats.formats import Formats
+from kfgen.fixed.ranges.declared import limits
 from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.real import RealProgram
 from kfgen.fixed.ranges.weather import Weather
-from kfgen.fixed.trial.probe import Departure, probe, shaken
+from kfgen.fixed.trial.integers import IntegerProgram
+from kfgen.fixed.trial.probe import probe, shaken
+from kfgen.fixed.trial.tour import FAILING, WIDE, Found
+from kfgen.spec.types import Spec
 
 PROBED = 120  # rows that the integers are tried on
 CHAOTIC = 16.0  # times as far as real numbers depart by less than what formats lose
-FAILING = 0.25  # standard deviations by which they may be off
 
 
-def judge(program: RealProgram, real: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed,
-          weather: Weather) -> Departure:  # fmt: skip
+def judge(program: RealProgram, real: FilterCode, integers: IntegerProgram, integer: FilterCode, formats: Formats,
+          scalar: Fixed, weather: Weather) -> None:  # fmt: skip
     """Try the integers beside the real numbers. SpecError where they do not follow."""
     log, rows = weather.log(PROBED, Random(11), Random(111))
-    found = probe(program, real, integer, formats, scalar, log, rows)
+    found = probe(program, real, integers, integer, formats, log, rows)
     if found.sigmas <= FAILING and not found.errors:
-        return found
+        return
     if not found.errors and not found.beyond(shaken(program, real, formats, log, rows), FAILING, CHAOTIC):
-        return found  # the model magnifies whatever is rounded
+        return  # the model magnifies whatever is rounded
     state = real.model.spec.states[found.state]
-    bits = max(1, math.ceil(math.log2(min(found.sigmas, 1e9) / FAILING))) if found.sigmas > FAILING else 1
-    largest, least = _spread(formats, found.state, len(real.model.states))
-    what = f"{scalar.name} cannot carry `{state.name}`"
-    if least > 0:
-        what += f": its standard deviation goes from {largest:.3g} to {least:.3g}"
+    what, bits = _carrying(formats, found.state, real, scalar), _missing(found.sigmas)
     raise SpecError.at(
         state.place, f"{what}; {bits} bit{'s' * (bits > 1)} are missing",
-        "start with a smaller std, declare a range, try covariance: sqrt, or use float",
+        _cure(real, found.state, bits),
     )  # fmt: skip
+
+
+def hear(spec: Spec, heard: Collection[str]) -> None:
+    """SpecError for a sensor that has never measured anything in the runs, so that nothing is known of its update."""
+    mistakes = [
+        Mistake(
+            sensor.place, f"`{sensor.name}` has no value in any run of the model, and its update no binary points",
+            "let the filter start where h has a value, declare ranges in which it has, or give a log",
+        )
+        for sensor in spec.measurements if sensor.name not in heard
+    ]  # fmt: skip
+    if mistakes:
+        raise SpecError(mistakes)
+
+
+def refuse(found: Found, shaken: Found, real: FilterCode, formats: Formats, scalar: Fixed) -> None:
+    """SpecError where the integers have not followed everywhere in the declared box.
+
+    shaken: what digits that no format keeps make of the model there, which may magnify whatever is rounded.
+    """
+    far = found.sigmas > max(FAILING, CHAOTIC * shaken.sigmas)
+    if not far and found.share <= max(WIDE, CHAOTIC * shaken.share) and not found.errors:
+        return
+    i = found.state if far else found.widest
+    bits = max(_missing(found.sigmas), math.ceil(math.log2(max(min(found.share, 1e9) / WIDE, 2.0))))
+    what = _carrying(formats, i, real, scalar)
+    raise SpecError.at(
+        real.model.spec.states[i].place,
+        f"{what}, everywhere in the declared ranges; {bits} bit{'s' * (bits > 1)} missing",
+        f"{_narrower(real, i, bits)}; or use covariance: sqrt, or float",
+    )  # fmt: skip
+
+
+def _cure(real: FilterCode, i: int, bits: int) -> str:
+    cure = "start with a smaller std, declare a range, try covariance: sqrt, or use float"
+    return cure if real.model.spec.states[i].range is None else f"{_narrower(real, i, bits)}; or {cure}"
+
+
+def _narrower(real: FilterCode, i: int, bits: int) -> str:
+    """The range of a state that is by so many bits smaller, or which others would have to be."""
+    model = real.model
+    state = model.spec.states[i]
+    if state.range is None:
+        return f"narrow the ranges of what it depends on by a factor of {2**bits}"
+    low, high = limits(state.range, model.spec)
+    middle = min(max(float(model.x0[i]), low), high)
+    low, high = (middle + (end - middle) / 2**bits for end in (low, high))
+    return f"range: [{low:.4g}, {high:.4g}] would fit, or narrow those of what it depends on by a factor of {2**bits}"
+
+
+def _missing(sigmas: float) -> int:
+    return max(1, math.ceil(math.log2(min(sigmas, 1e9) / FAILING))) if sigmas > FAILING else 1
+
+
+def _carrying(formats: Formats, i: int, real: FilterCode, scalar: Fixed) -> str:
+    states = real.model.spec.states
+    largest, least = _spread(formats, i, len(states))
+    what = f"{scalar.name} cannot carry `{states[i].name}`"
+    return f"{what}: its standard deviation goes from {largest:.3g} to {least:.3g}" if least > 0 else what
 
 
 def _spread(formats: Formats, i: int, n: int) -> tuple[float, float]:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import accumulate
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic.limits import LEAST, LIMIT
-from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.formats.formats import Formats
 from kfgen.fixed.program.cells import Cell
 from kfgen.fixed.ranges.memory import Memory, blank
 from kfgen.fixed.ranges.real import RealProgram
 from kfgen.fixed.ranges.runs import Columns, elapsed, readings
 from kfgen.fixed.trial.integers import IntegerProgram
+from kfgen.spec.types import Sensor
 
 SHAKEN = 2.0**-11  # of a covariance: what a format of 12 bits would lose in a step
 ERRORS = ("NOT_FINITE", "NOT_POSITIVE")
@@ -30,7 +30,6 @@ class Departure:
     row: int
     errors: int  # calls that only the integers refused
     course: tuple[float, ...] = ()  # the error after each row
-    peaks: Mapping[int, int] = field(default_factory=dict)  # see `certificate.certify`
 
     def beyond(self, other: Departure, least: float, factor: float) -> bool:
         """Whether an error is larger than `least`, and than `factor` times what the other has had by then."""
@@ -46,15 +45,13 @@ def shaken(real: RealProgram, code: FilterCode, formats: Formats, log: Columns, 
     return _Shaken(real, code, formats).run(log, rows)
 
 
-def probe(real: RealProgram, code: FilterCode, integer: FilterCode, formats: Formats, scalar: Fixed, log: Columns,
-          rows: int) -> Departure:  # fmt: skip
+def probe(real: RealProgram, code: FilterCode, program: IntegerProgram, integer: FilterCode, formats: Formats,
+          log: Columns, rows: int) -> Departure:  # fmt: skip
     """Run both over a log, each from its own init."""
-    program = IntegerProgram(list(integer.functions), formats.arrays, scalar)
-    found = _Probe(real, program, code, formats, integer).run(log, rows)
-    return replace(found, peaks=program.peaks)
+    return Probe(real, program, code, formats, integer).run(log, rows)
 
 
-class _Probe:
+class Probe:
     """Two filters over one log: `a` of real numbers, `b` of integers."""
 
     def __init__(self, real: RealProgram, integer: RealProgram, code: FilterCode, formats: Formats,
@@ -66,7 +63,8 @@ class _Probe:
         self.spec = code.model.spec
         self.formats = formats
         self.a = blank(code)
-        self.b = _integers(blank(lowered))
+        self.lowered = lowered
+        self.b = integers(blank(lowered))
         self.refused = 0
 
     def raw(self, cell: Cell, value: float) -> int:
@@ -79,13 +77,17 @@ class _Probe:
         self.b.numbers[path] = raw
         self.a.numbers[path] = math.ldexp(raw, self.formats.fixed[cell])
 
+    def read(self, sensor: Sensor, values: Sequence[float]) -> None:
+        """Give a reading."""
+        for c, v in zip(sensor.components, values, strict=True):
+            self.give(("number", f"update_{sensor.name}", f"z.{c.name}"), f"z.{c.name}", v)
+
     def call(self, function: str) -> None:
         one, two = self.real.run(function, self.a), self.integer.run(function, self.b)
         self.refused += two in ERRORS and one not in ERRORS
 
     def run(self, log: Columns, rows: int) -> Departure:
         self.call("init")
-        n = len(self.code.model.states)
         run_time = self.spec.dt is not None and self.spec.dt.run_time
         worst = Departure(0, 0.0, 0, 0)
         course = []
@@ -99,13 +101,11 @@ class _Probe:
                 self.call("predict")
             for sensor in self.spec.measurements:
                 values = readings(log, sensor, k)
-                if any(map(math.isnan, values)):
-                    continue
-                for c, v in zip(sensor.components, values, strict=True):
-                    self.give(("number", f"update_{sensor.name}", f"z.{c.name}"), f"z.{c.name}", v)
-                self.call(f"update_{sensor.name}")
+                if not any(map(math.isnan, values)):
+                    self.read(sensor, values)
+                    self.call(f"update_{sensor.name}")
             self.between()
-            state, sigmas = self._error(n)
+            state, sigmas = self.error()
             course.append(sigmas)
             if not sigmas <= worst.sigmas:
                 worst = Departure(state, sigmas, k, 0)
@@ -137,7 +137,9 @@ class _Probe:
             if not f.name.startswith("update_") or f.name.endswith("_masked"):
                 self.integer.run(f.name, other)
 
-    def _error(self, n: int) -> tuple[int, float]:
+    def error(self) -> tuple[int, float]:
+        """The largest error of a state, in standard deviations, and of which."""
+        n = len(self.code.model.states)
         variances = [math.inf] * n
         if any(f.name == "get_covariance" for f in self.code.functions):
             self.real.run("get_covariance", self.a)
@@ -153,13 +155,10 @@ class _Probe:
         return worst
 
 
-class _Shaken(_Probe):
-    """`b` is of real numbers too, a little off."""
+class Shaking(Probe):
+    """`b` is of real numbers too, a little off: after each row x is rounded to its LSB, and P shaken."""
 
-    def __init__(self, real: RealProgram, code: FilterCode, formats: Formats) -> None:
-        super().__init__(real, real, code, formats, code)
-        self.b = blank(code)
-        self.sign = 1.0
+    sign = 1.0
 
     def give(self, cell: Cell, path: str, value: float) -> None:
         super().give(cell, path, value)
@@ -183,7 +182,15 @@ class _Shaken(_Probe):
         pass
 
 
-def _integers(memory: Memory) -> Memory:
+class _Shaken(Shaking):
+    """Over a log."""
+
+    def __init__(self, real: RealProgram, code: FilterCode, formats: Formats) -> None:
+        super().__init__(real, real, code, formats, code)
+        self.b = blank(code)
+
+
+def integers(memory: Memory) -> Memory:
     return Memory(
         {name: [0] * len(values) for name, values in memory.arrays.items()},
         {name: value if isinstance(value, bool) else 0 for name, value in memory.numbers.items()},

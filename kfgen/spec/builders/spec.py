@@ -116,7 +116,8 @@ class Builder:
             return Fixed()
         scale = f.get("scale")
         by_state = dict(entries(scale)) if isinstance(scale, Fields) else None
-        return Fixed(by_state, f.get("rounding", "nearest"), f.get("overflow", "saturate"))
+        at = f.places.get("log", f.place)
+        return Fixed(by_state, f.get("rounding", "nearest"), f.get("overflow", "saturate"), f.get("log"), at)
 
     def compensated(self, written: object) -> tuple[str, ...]:
         if isinstance(written, bool):

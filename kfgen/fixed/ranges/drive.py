@@ -1,0 +1,150 @@
+"""Drives all over the declared box, in legs.
+
+A leg puts truth and estimate to a point of the box, gives the filter other parameters, and drives the inputs and the
+step to their ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from kfgen.fixed.ranges.box import Box, clipped
+from kfgen.fixed.ranges.generator import Random
+from kfgen.fixed.ranges.legs import LEGS, Leg, at, legs
+from kfgen.fixed.ranges.weather import Weather
+
+ROWS = 30  # of a leg
+DARK = 0.2  # the share of its rows after which a dark leg has no readings
+BLINK = 10  # rows without readings at a corner
+HELD = 6  # rows for which an input keeps its value, at least
+
+
+@dataclass
+class Seen:
+    """How far the runs have gone in a quantity that has a declared range."""
+
+    low: float = math.inf
+    high: float = -math.inf
+
+    def take(self, value: float) -> None:
+        self.low, self.high = min(self.low, value), max(self.high, value)
+
+
+class Player(Protocol):
+    """What a drive is made with: a filter, or several side by side."""
+
+    def begin(self, fresh: bool, parameters: Mapping[str, float]) -> None:
+        """A leg begins, with a filter as it is after init or with what the leg before has left."""
+        ...
+
+    def estimate(self) -> list[float]:
+        """The estimate (n)."""
+        ...
+
+    def place(self, x: Sequence[float]) -> None:
+        """Put it to x (n)."""
+        ...
+
+    def row(self, inputs: Mapping[str, float], dt: float, readings: Mapping[str, Sequence[float]], k: int) -> bool:
+        """A step and its updates; False where the leg is to end."""
+        ...
+
+
+class Drive:
+    """Makes the legs of a filter, row by row."""
+
+    def __init__(self, weather: Weather, box: Box) -> None:
+        self.weather = weather
+        self.box = box
+        self.truth = weather.truth
+        self.model = weather.model
+        self.seen: dict[str, Seen] = {}
+
+    def run(self, player: Player, seed: int, count: int = LEGS, rows: int = ROWS) -> None:
+        """All legs."""
+        random = Random(seed)
+        for k, leg in enumerate(legs(self.model, self.box, random, count)):
+            self._leg(player, leg, k, rows, random)
+
+    def _leg(self, player: Player, leg: Leg, k: int, rows: int, random: Random) -> None:
+        truth, n = self.truth, self.truth.n
+        player.begin(leg.fresh, leg.parameters)
+        truth.begin(random)
+        truth.memory.numbers.update({f"kf.parameters.{name}": value for name, value in leg.parameters.items()})
+        off = [a - float(b) for a, b in zip(truth.x, self.model.x0, strict=True)] if leg.fresh else [0.0] * n
+        truth.place(leg.x, [0.0] * n)
+        self._place(player, [a + e for a, e in zip(leg.x, off, strict=True)])
+        mode = k % self.weather.modes
+        for row in range(rows):
+            if row == rows // 2:
+                mode = (mode + 1) % self.weather.modes
+            inputs, dt = self._inputs(leg, row, random), self._dt(leg, row, random)
+            start = list(truth.x)
+            there = self._stepped(mode, inputs, dt, random)
+            if there and any(truth.cut) and inputs:  # the other way round it may stay within
+                leg.places = {name: 1.0 - p if name.startswith("u.") else p for name, p in leg.places.items()}
+                inputs = self._inputs(leg, row, random)
+                truth.place(start, [0.0] * n)
+                there = self._stepped(mode, inputs, dt, random)
+            if not there:
+                return
+            if any(truth.cut):  # and the estimate with it
+                self._place(player, [a - c for a, c in zip(player.estimate(), truth.cut, strict=True)])
+            end = DARK * rows + BLINK if leg.corner else rows - 2  # at the ends of everything variances grow fast
+            dark = leg.dark and DARK * rows <= row < end
+            sensors = () if dark else self.model.sensors
+            readings = {s.name: self._reading(mode, i, random) for i, s in enumerate(sensors)}
+            if not player.row(inputs, dt, readings, row):
+                return
+            self._note(leg, inputs, dt)
+
+    def _place(self, player: Player, x: Sequence[float]) -> None:
+        player.place([
+            part.placed(self.box.inside(i, a) if part.flat else a)
+            for i, (a, part) in enumerate(zip(x, self.model.parts, strict=True))
+        ])  # fmt: skip
+
+    def _stepped(self, mode: int, inputs: dict[str, float], dt: float, random: Random) -> bool:
+        """A step of the truth; False where it leaves the numbers."""
+        self.truth.memory.numbers.update({f"u.{name}": value for name, value in inputs.items()})
+        return self.truth.step(mode, dt, random)
+
+    def _note(self, leg: Leg, inputs: dict[str, float], dt: float) -> None:
+        """How far the row has gone."""
+        given = {**dict(zip(self.model.states, self.truth.x, strict=True)), **inputs, **leg.parameters}
+        if self.weather.run_time:
+            given["dt"] = dt
+        for name, value in given.items():
+            self.seen.setdefault(name, Seen()).take(value)
+
+    def _inputs(self, leg: Leg, row: int, random: Random) -> dict[str, float]:
+        """At the ends of their ranges by turns, or about a place in them."""
+        out = {}
+        for i, name in enumerate(self.model.inputs):
+            span, place = self.box.inputs.get(name), leg.places[f"u.{name}"]
+            if leg.corner:
+                place = place if row // (HELD + 5 * i) % 2 == 0 else 1.0 - place
+            else:
+                place += 0.1 * (2 * random.random() - 1)
+            out[name] = at((-1.0, 1.0) if span is None else span, place)
+        return out
+
+    def _dt(self, leg: Leg, row: int, random: Random) -> float:
+        weather, span = self.weather, self.box.dt
+        if not weather.run_time:
+            return weather.nominal
+        if span is None:
+            return weather.nominal * (0.9 + 0.2 * random.random())
+        if leg.corner:
+            return span[int(leg.places["dt"] < 0.5) if row // HELD % 3 == 2 else int(leg.places["dt"] >= 0.5)]
+        return at(span, random.random() ** 2) if row % 3 else weather.nominal
+
+    def _reading(self, mode: int, k: int, random: Random) -> list[float]:
+        sensor = self.model.sensors[k]
+        return [
+            clipped(z, self.box.readings.get((sensor.name, c.name)))
+            for z, c in zip(self.truth.see(mode, k, random), sensor.spec.components, strict=True)
+        ]
