@@ -73,6 +73,9 @@ class Draw:
             data["inputs"] = {u: {"range": [-2, 2]} for u in self.inputs}
         if self.noises:
             data["noise"] = {w: self.noise() for w in self.noises}
+            if len(self.noises) == 2 and self.chance(0.2):
+                data["noise"] = {w: {} for w in self.noises}
+                data["noise_covariance"] = [[0.04, 0.02], [0.02, 0.03]]
         if not self.linear and self.chance(0.4):
             data["let"] = {"l0": self.curve(), "l1": "0.5*l0 + 0.1"}
         data["dynamics"] = self.dynamics("let" in data)
@@ -216,6 +219,8 @@ class Draw:
             component["h"] += f" + {noise}" if self.linear or self.chance(0.5) else f" + 0.5*{noise}*{self.unitless(i)}"
         if not full:
             component["std"] = self.deviation()
+        if not self.fixed and "kind" not in component and self.chance(0.06):
+            component["residual"] = "where(abs(z - h) < 2, z - h, 1.5*(z - h))"
         if self.fixed and "kind" not in component:
             component["range"] = [-60, 60]
         return component

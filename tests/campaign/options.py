@@ -9,7 +9,8 @@ from tests.campaign.model import Data, Draw
 FORMS = (("ud", "bierman"), ("ud", "joseph"), ("full", "joseph"), ("full", "standard"), ("sqrt", None))
 POINTS: tuple[dict[str, Any], ...] = (
     {}, {"kind": "merwe", "alpha": 0.5, "beta": 2, "kappa": 1}, {"kind": "merwe", "alpha": 0.1},
-    {"kind": "julier", "kappa": 1}, {"kind": "wiki"}, {"kind": "trivial"}, {"kind": "cubature"},
+    {"kind": "julier", "kappa": 1}, {"kind": "julier", "kappa": -0.5},
+    {"kind": "wiki"}, {"kind": "trivial"}, {"kind": "cubature"},
 )  # fmt: skip
 
 
@@ -41,6 +42,8 @@ def filter_of(draw: Draw, kind: str, data: Data) -> Data:
     made: Data = {"type": kind, "covariance": covariance}
     if kind != "ukf" and update:
         made["update"] = update
+    if kind == "kf" and chance(0.15):
+        made["gain"] = "steady"
     if kind == "iekf":
         made["iterations"] = dice.choice((1, 2, 3))
     if kind == "ukf":
