@@ -13,13 +13,16 @@ from kfgen.reference.process import Process
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import StepError
 from kfgen.simulate import simulate
+from kfgen.spec.advice.usage import expressions
 from kfgen.spec.modes import mode_specs
+from kfgen.spec.tree import Call
 from kfgen.spec.types import Dynamics, Spec
 
 Array = NDArray[np.float64]
 
 ROWS = 24  # at least; three times as many as there are states where that is more
 MOST = 60
+WORK = 100_000  # operations, with gradients: about a second
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,8 @@ def follow(spec: Spec) -> list[Track]:
     """The tracks of a spec, or of its modes. KfgenError where the model does not get through one."""
     spec = _quick(spec)
     rows = min(MOST, max(ROWS, 3 * len(spec.states)))
+    if rows * sum(map(_size, mode_specs(spec))) > WORK:
+        raise KfgenError(f"{spec.name}: a track of the model takes too long for advice")
     log = simulate(spec, rows, seed=1)
     x = np.column_stack([log.columns[f"true.{state.name}"] for state in spec.states])
     u = np.column_stack([log.columns[each.name] for each in spec.inputs] or [np.zeros((rows, 0))])
@@ -65,6 +70,22 @@ def _quick(spec: Spec) -> Spec:
     if imm is not None:
         imm = replace(imm, modes=tuple(replace(mode, dynamics=quick(mode.dynamics)) for mode in imm.modes))
     return replace(spec, dynamics=quick(spec.dynamics), imm=imm)
+
+
+def _size(spec: Spec) -> int:
+    """Operations of a step and of all measurements, about."""
+
+    def nodes(part: object) -> int:
+        stack, count = [each.tree for each in expressions(part)], 0
+        while stack:
+            tree = stack.pop()
+            count += 1
+            stack += tree.args if isinstance(tree, Call) else ()
+        return count
+
+    dynamics = spec.dynamics
+    stages = {"euler": 1, "midpoint": 2}.get(dynamics.integrator, 4) * dynamics.substeps
+    return nodes((dynamics, spec.let)) * (stages if dynamics.form == "continuous" else 1) + nodes(spec.measurements)
 
 
 def _along(spec: Spec, x: Array, u: Array, t: Array) -> Track:
