@@ -58,6 +58,7 @@ beetle_status_t beetle_init(beetle_t *kf)
     kf->modes.run.D[1] = 2500.0f;
     kf->modes.run.D[2] = 1.0f;
     kf->modes.run.D[3] = 0.49f;
+    kf->modes.run.nis = 0.0f;
     kf->modes.turn.x[BEETLE_PX] = 0.0f;
     kf->modes.turn.x[BEETLE_PY] = 0.0f;
     kf->modes.turn.x[BEETLE_V] = 5.0f;
@@ -69,6 +70,7 @@ beetle_status_t beetle_init(beetle_t *kf)
     kf->modes.turn.D[1] = 2500.0f;
     kf->modes.turn.D[2] = 1.0f;
     kf->modes.turn.D[3] = 0.49f;
+    kf->modes.turn.nis = 0.0f;
     kf->nis = 0.0f;
     kf->initialized = false;
     kf->parameters.pace = 5.0f;
@@ -897,6 +899,8 @@ beetle_status_t beetle_update_camera(beetle_t *kf, const beetle_camera_t *z)
     kf->x[BEETLE_PY] = py_all;
     kf->x[BEETLE_V] = v_all;
     kf->x[BEETLE_TH] = beetle_wrap(th_all, 3.1415927f);
+    kf->modes.run.nis = nis_run;
+    kf->modes.turn.nis = nis_turn;
     kf->nis = beetle_min(nis_run, nis_turn);
     return BEETLE_OK;
 }

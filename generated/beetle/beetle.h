@@ -15,7 +15,7 @@
  *   vector
  * step: given at each step, clamped to at least 0.01 s, at most 2 s
  *
- * RAM 152 bytes a filter. Operations:
+ * RAM 160 bytes a filter. Operations:
  *   predict        586 mul, 464 add, 70 div, 4 sqrt, 27 compare, 10 cos, 1 exp, 47 select, 10 sin,
  *       18 wrap
  *   update_camera  142 mul, 125 add, 17 div, 8 compare, 2 exp, 4 log, 2 max, 1 min, 4 select, 5
@@ -88,12 +88,14 @@ typedef struct {
     beetle_real_t x[4]; /* state */
     beetle_real_t U[6]; /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     beetle_real_t D[4]; /* diagonal factor: P = U D U^T */
+    beetle_real_t nis;  /* normalised innovation squared of the last update */
 } beetle_mode_run_t;
 
 typedef struct {
     beetle_real_t x[4]; /* state */
     beetle_real_t U[6]; /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
     beetle_real_t D[4]; /* diagonal factor: P = U D U^T */
+    beetle_real_t nis;  /* normalised innovation squared of the last update */
 } beetle_mode_turn_t;
 
 /* The filter. Plain data: copy it, keep as many as you like. */

@@ -74,6 +74,7 @@ maneuver_status_t maneuver_init(maneuver_t *kf)
         kf->modes.cruise.P[i] = 0.0f;
     }
     kf->modes.cruise.P[20] = 0.0025f;
+    kf->modes.cruise.nis = 0.0f;
     kf->modes.speed.x[MANEUVER_PX] = 8000.0f;
     kf->modes.speed.x[MANEUVER_PY] = 6000.0f;
     kf->modes.speed.x[MANEUVER_V] = 120.0f;
@@ -98,6 +99,7 @@ maneuver_status_t maneuver_init(maneuver_t *kf)
         kf->modes.speed.P[i] = 0.0f;
     }
     kf->modes.speed.P[20] = 0.0025f;
+    kf->modes.speed.nis = 0.0f;
     kf->modes.turn.x[MANEUVER_PX] = 8000.0f;
     kf->modes.turn.x[MANEUVER_PY] = 6000.0f;
     kf->modes.turn.x[MANEUVER_V] = 120.0f;
@@ -122,6 +124,7 @@ maneuver_status_t maneuver_init(maneuver_t *kf)
         kf->modes.turn.P[i] = 0.0f;
     }
     kf->modes.turn.P[20] = 0.0025f;
+    kf->modes.turn.nis = 0.0f;
     kf->nis = 0.0f;
     kf->gate_count_radar = 0;
     return MANEUVER_OK;
@@ -1319,6 +1322,9 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->x[MANEUVER_A] = a_all;
     kf->x[MANEUVER_W] = w_all;
     kf->gate_count_radar = 0;
+    kf->modes.cruise.nis = nis_cruise;
+    kf->modes.speed.nis = nis_speed;
+    kf->modes.turn.nis = nis_turn;
     kf->nis = t145;
     return flags;
 }

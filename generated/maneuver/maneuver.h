@@ -17,7 +17,7 @@
  *   turn: Extended Kalman filter, full covariance, standard update
  * step: 1 s, compiled in
  *
- * RAM 368 bytes a filter. Operations:
+ * RAM 380 bytes a filter. Operations:
  *   predict       464 mul, 451 add, 6 div, 11 compare, 3 cos, 20 select, 3 sin, 15 wrap
  *   update_radar  340 mul, 319 add, 17 div, 3 sqrt, 3 atan2, 23 compare, 3 exp, 6 log, 3 max, 2
  *       min, 14 select, 10 wrap
@@ -88,16 +88,19 @@ typedef struct {
 typedef struct {
     maneuver_real_t x[6];  /* state */
     maneuver_real_t P[21]; /* covariance: P_ij, i <= j, at j (j + 1) / 2 + i */
+    maneuver_real_t nis;   /* normalised innovation squared of the last update */
 } maneuver_mode_cruise_t;
 
 typedef struct {
     maneuver_real_t x[6];  /* state */
     maneuver_real_t P[21]; /* covariance: P_ij, i <= j, at j (j + 1) / 2 + i */
+    maneuver_real_t nis;   /* normalised innovation squared of the last update */
 } maneuver_mode_speed_t;
 
 typedef struct {
     maneuver_real_t x[6];  /* state */
     maneuver_real_t P[21]; /* covariance: P_ij, i <= j, at j (j + 1) / 2 + i */
+    maneuver_real_t nis;   /* normalised innovation squared of the last update */
 } maneuver_mode_turn_t;
 
 /* The filter. Plain data: copy it, keep as many as you like. */
