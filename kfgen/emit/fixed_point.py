@@ -39,7 +39,6 @@ def routines(fixed: FixedPoint, helpers: Iterable[str]) -> Routines:
     """The routines to define where the code calls these helpers (`q_mul`, ...): those that they need included."""
     used = {op.removeprefix("q_") for op in helpers if op.startswith("q_")}
     used |= {"asr", "moved", "product", "round"} if used & {"fma", "mac"} else set()
-    used |= {"fit"} if "mac" in used else set()
     return Routines(fixed.closure(used - OWN, fixed.floor), tuple(sorted(used & OWN)), fixed.tables, fixed.floor)
 
 

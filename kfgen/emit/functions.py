@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from kfgen.emit.data import FunctionView
@@ -95,6 +96,8 @@ class FunctionMaker:
         opening = [] if f.private else [f"if ({test}) {{ {leave} }}"]
         if has_flags and not f.private:
             opening.append(f"{self.name}_status_t flags = {self.NAME}_OK;")
+        text = "\n".join(body)
+        opening += [f"(void){a.name};" for a in f.arguments if f.private and not re.search(rf"\b{a.name}\b", text)]
         if body and body[0].lstrip().startswith("/*"):
             opening.append("")
         return tuple(opening)

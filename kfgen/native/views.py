@@ -36,7 +36,7 @@ class ModeView:
 
     @property
     def nis(self) -> float:
-        """The normalised innovation squared of the mode in the last update."""
+        """The normalised innovation squared of the mode in the last update that was made."""
         raw = np.array(self.raw["nis"], self._struct.value.dtype)
         return float(self._struct.value.to_physical(raw, self._struct.units.one))
 

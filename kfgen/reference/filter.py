@@ -240,16 +240,15 @@ class ReferenceFilter:
         name = reading.sensor.name
         algorithm = self.algorithm.of(name)
         innovation = algorithm.innovate(self._estimate, reading)
-        every = self.algorithm.nis_of_modes(innovation)
         verdict = self.algorithm.judge(innovation, reading, self.gate_count[name])
         if verdict == Status.GATED:
-            self.nis, self.nis_of_modes = innovation.nis, every
+            self.nis = innovation.nis
             self.gate_count[name] += 1
             return verdict
         correction: Correction = algorithm.correct(self._estimate, reading, innovation)
         self._estimate = correction.estimate
         self.nis, self.log_likelihood = innovation.nis, correction.log_likelihood
-        self.nis_of_modes = every
+        self.nis_of_modes = self.algorithm.nis_of_modes(innovation)
         self.gate_count[name] = 0
         return verdict | correction.flags
 

@@ -13,7 +13,8 @@ from kfgen.spec.types import Filter
 class ModeView:
     """One mode of a bank, as it is at present.
 
-    Attributes (arrays are copies): name; x (n), P (n, n), sqrt_covariance (n, n): the mode's own estimate; nis;
+    Attributes (arrays are copies): name; x (n), P (n, n), sqrt_covariance (n, n): the mode's own estimate; nis: of the
+    last update that was made;
     R: sensor -> (m, m), Q (n, n): its adapted noise covariances. As in ReferenceFilter.
     """
 

@@ -33,3 +33,19 @@ def test_robust_and_adaptive(options):
     assert plain.step < other.step <= MOST * plain.step
     assert other.ram == plain.ram
     assert other.stack <= 160
+
+
+@pytest.mark.usefixtures("_tools")
+@pytest.mark.parametrize("form", ["ud", "full", "sqrt"])
+def test_a_variance_that_is_never_zero(form):
+    """Of a parameter whose range excludes 0, beside a constant one: a product."""
+
+    def update(deviation: str, range: str) -> float:
+        text = problems.CV4.replace("{type: ekf}", f"{{type: ekf, covariance: {form}}}").replace("var: 400", deviation)
+        assert deviation in text
+        text = text.replace("dt: 0.1", f"dt: 0.1\nparameters: {{sigma: {{value: 20, range: {range}}}}}", 1)
+        spec = override(loads(text), "float")
+        return measure(build(spec), simulate(spec, 20, 1)).instructions["update_gnss"][0]
+
+    constant = update("std: 20", "[1, 50]")
+    assert update("std: sigma", "[1, 50]") <= constant + 2 < update("std: sigma", "[0, 50]")

@@ -55,9 +55,9 @@ CASES = {
     ),
     "turn-gain": Case(
         TURN, "robust: chernodarov, adaptive: {chi2: 1}, adapt_Q: 0.02, consider: [th], gain_limit: 0.5",
-        SMALL | LARGE | GATED | ANOMALY, JOSEPH,
+        SMALL | LARGE | GATED | ANOMALY | REGULARIZED, JOSEPH,
     ),
-    "turn-gain-iekf": Case(TURN, "type: iekf, consider: [y], gain_limit: 0.3", GATED | ANOMALY, JOSEPH),
+    "turn-gain-iekf": Case(TURN, "type: iekf, consider: [y], gain_limit: 0.3", GATED | ANOMALY | REGULARIZED, JOSEPH),
     "radar": Case(RADAR, "robust: huber, adaptive: {chi2: 3}", LARGE | GATED | ANOMALY, ("ud-joseph", "sqrt")),
     "radar-iekf": Case(RADAR, "type: iekf, iterations: 4", GATED | ANOMALY, ("ud-bierman", "full-standard")),
     "radar-ekf2": Case(

@@ -181,3 +181,25 @@ def test_first_error():
                 status = it.calls(name, **changed)
                 assert status == it.expected(name, changed, parameters) or status < ERROR, (label, name)
                 assert status < ERROR or bytes(kf) == before
+
+
+KNOWN = """
+kfgen: 1
+name: known
+states: {x: {init: 0, std: 1}, v: {init: 0, std: 1}}
+dynamics: {f: {}}
+measurements: {m: {z: {y: {h: 0.3*x + 0.7*v, std: 0}}}}
+filter: {type: ukf, adaptive: true, covariance: FORM}
+"""
+
+
+@pytest.mark.parametrize("scalar", ["float", "double"])
+def test_what_is_known_exactly_is_skipped(scalar):
+    """A second exact measurement that contradicts the first makes no anomaly of rounding."""
+    for form in ("full", "ud", "sqrt"):
+        (kf,) = load_filters([build(override(loads(KNOWN.replace("FORM", form)), scalar))], flags=("-O0",))
+        assert kf.update("m", [1]) < Status.GLITCH_SMALL
+        P = kf.P
+        assert kf.update("m", [2]) == 0
+        assert kf.nis == 0
+        assert (kf.P == P).all(), form

@@ -230,8 +230,7 @@ class Imm:
             first.append(_advance(t, *runs[-1]))
         t.settle()
         judged = [phase.nis for phase in first if phase.nis is not None]
-        fields = [mode.path("nis") for mode in self.modes]
-        gate(t, self.model, sensors, judged, used, fields)
+        gate(t, self.model, sensors, judged, used)
         made: list[Made] = []
         for run, phase in zip(runs, first, strict=True):
             while isinstance(phase, Judged):
@@ -240,6 +239,7 @@ class Imm:
         t.settle()
         mu, log_likelihood = self.weighed(t, made)
         self._store(t, runs, self.combined(t, made, mu), mu)
+        fields = [mode.path("nis") for mode in self.modes]
         store_outcome(t, self.model, sensors, judged, log_likelihood, fields)
         guards.settled(t, self.model)
         name, doc = update_name(sensors[0], partial)

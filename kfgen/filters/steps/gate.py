@@ -19,13 +19,12 @@ from kfgen.quantiles import chi2_quantile
 
 
 def gate(
-    t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], used: list[Value] | None,
-    fields: Sequence[str] = (),
+    t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], used: list[Value] | None
 ) -> None:
     """End the update where nis is beyond the gate; after reset_after rejections take it all the same.
 
-    A bank has the sensor and nis of each of its modes, and refuses what all of them refuse; fields: where each nis is
-    kept. used: whether each component counts, where a mask tells.
+    A bank has the sensor and nis of each of its modes, and refuses what all of them refuse. used: whether each
+    component counts, where a mask tells.
     """
     gates = [sensor.gate for sensor in sensors if sensor.gate is not None]
     if len(gates) < len(sensors):
@@ -34,7 +33,6 @@ def gate(
     m = sensors[0].dimension
     beyond = reduce(and_, [v > _threshold(t, model, g, m, used) for g, v in zip(gates, nis, strict=True)])
     before = [Store("kf.nis", None, smallest(t, nis).node)]
-    before += [Store(path, None, v.node) for path, v in zip(fields, nis, strict=bool(fields))]
     if not counts_gated(model, sensors):
         t.guard(beyond, "GATED", before=before)
         return

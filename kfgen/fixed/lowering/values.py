@@ -72,7 +72,7 @@ class Values:
         if s > 0:
             low, high = (nearest(Fraction(v), s) for v in (a.low, a.high))
             return Raw(make("q_shift", (a.node,), (min(s, 62),)), e, low, high)
-        if a.size << -s <= LIMIT:
+        if -s < LIMIT.bit_length() and a.size << -s <= LIMIT:
             return Raw(make("mul", (a.node, constant(1 << -s))), e, a.low << -s, a.high << -s)
         return Raw(make("q_shift", (a.node,), (max(s, -62),)), e)
 
