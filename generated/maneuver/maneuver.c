@@ -1065,9 +1065,6 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float t145 = maneuver_min(maneuver_min(nis_cruise, nis_speed), nis_turn);
     if (t144 && kf->gate_count_radar < 3u) {
         kf->nis = t145;
-        kf->modes.cruise.nis = nis_cruise;
-        kf->modes.speed.nis = nis_speed;
-        kf->modes.turn.nis = nis_turn;
         kf->gate_count_radar = kf->gate_count_radar + 1u;
         return MANEUVER_GATED;
     }
@@ -1510,4 +1507,4 @@ void maneuver_get_covariance(const maneuver_t *kf, maneuver_real_t P[36])
         }
     }
 }
-/* kfgen: body 3712e7453448b4658c888aefd844faac */
+/* kfgen: body a34510ef79879bbc6efa979c0a25a384 */
