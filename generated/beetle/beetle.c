@@ -415,58 +415,36 @@ beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt)
     const float t195 = sqrtf(d_py_next_turn);
     const float t196 = sqrtf(d_v_next_turn);
     const float t197 = sqrtf(d_th_next_turn);
-    const float t198 = 2.0f * sqrtf(d_px_next_turn);
-    points_turn[0] = t198;
+    points_turn[0] = 2.0f * sqrtf(d_px_next_turn);
     points_turn[1] = 0.0f;
     points_turn[2] = 0.0f;
     points_turn[3] = 0.0f;
-    points_turn[4] = -t198;
-    points_turn[5] = 0.0f;
-    points_turn[6] = 0.0f;
-    points_turn[7] = 0.0f;
-    const float t199 = u_px_py_next_turn * t195 * 2.0f;
-    const float t200 = 2.0f * t195;
-    points_turn[8] = t199;
-    points_turn[9] = t200;
+    points_turn[8] = u_px_py_next_turn * t195 * 2.0f;
+    points_turn[9] = 2.0f * t195;
     points_turn[10] = 0.0f;
     points_turn[11] = 0.0f;
-    points_turn[12] = -t199;
-    points_turn[13] = -t200;
-    points_turn[14] = 0.0f;
-    points_turn[15] = 0.0f;
-    const float t201 = u_px_v_next_turn * t196 * 2.0f;
-    const float t202 = u_py_v_next_turn * t196 * 2.0f;
-    const float t203 = 2.0f * t196;
-    points_turn[16] = t201;
-    points_turn[17] = t202;
-    points_turn[18] = t203;
+    points_turn[16] = u_px_v_next_turn * t196 * 2.0f;
+    points_turn[17] = u_py_v_next_turn * t196 * 2.0f;
+    points_turn[18] = 2.0f * t196;
     points_turn[19] = 0.0f;
-    points_turn[20] = -t201;
-    points_turn[21] = -t202;
-    points_turn[22] = -t203;
-    points_turn[23] = 0.0f;
-    const float t204 = u_px_th_next_turn * t197 * 2.0f;
-    const float t205 = u_py_th_next_turn * t197 * 2.0f;
-    const float t206 = u_v_th_next_turn * t197 * 2.0f;
-    const float t207 = 2.0f * t197;
-    points_turn[24] = t204;
-    points_turn[25] = t205;
-    points_turn[26] = t206;
-    points_turn[27] = t207;
-    points_turn[28] = -t204;
-    points_turn[29] = -t205;
-    points_turn[30] = -t206;
-    points_turn[31] = -t207;
-    float centre_turn[4];
-    centre_turn[0] = px_turn_1;
-    centre_turn[1] = py_turn_1;
-    centre_turn[2] = v_turn_1;
-    centre_turn[3] = th_turn_1;
-    beetle_f(kf, step, centre_turn);
-    const float px_centre_turn = centre_turn[0];
-    const float py_centre_turn = centre_turn[1];
-    const float v_centre_turn = centre_turn[2];
-    const float th_centre_turn = centre_turn[3];
+    points_turn[24] = u_px_th_next_turn * t197 * 2.0f;
+    points_turn[25] = u_py_th_next_turn * t197 * 2.0f;
+    points_turn[26] = u_v_th_next_turn * t197 * 2.0f;
+    points_turn[27] = 2.0f * t197;
+    for (int j = 0; j < 4; j++) {
+        const float part_0_turn = points_turn[8 * j];
+        points_turn[8 * j] = px_turn_1 + part_0_turn;
+        points_turn[8 * j + 4] = px_turn_1 - part_0_turn;
+        const float part_1_turn = points_turn[8 * j + 1];
+        points_turn[8 * j + 1] = py_turn_1 + part_1_turn;
+        points_turn[8 * j + 5] = py_turn_1 - part_1_turn;
+        const float part_2_turn = points_turn[8 * j + 2];
+        points_turn[8 * j + 2] = v_turn_1 + part_2_turn;
+        points_turn[8 * j + 6] = v_turn_1 - part_2_turn;
+        const float part_3_turn = points_turn[8 * j + 3];
+        points_turn[8 * j + 3] = th_turn_1 + part_3_turn;
+        points_turn[8 * j + 7] = th_turn_1 - part_3_turn;
+    }
     float shift_px_turn = 0.0f;
     float shift_py_turn = 0.0f;
     float shift_v_turn = 0.0f;
@@ -482,17 +460,13 @@ beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt)
     float d_v_turn = step;
     float d_th_turn = step;
 
-    /* turn: points through f; deviations overwrite them */
+    /* turn: points through f, and their deviations */
     for (int k = 0; k < 8; k++) {
-        points_turn[4 * k] = points_turn[4 * k] + px_turn_1;
-        points_turn[4 * k + 1] = points_turn[4 * k + 1] + py_turn_1;
-        points_turn[4 * k + 2] = points_turn[4 * k + 2] + v_turn_1;
-        points_turn[4 * k + 3] = points_turn[4 * k + 3] + th_turn_1;
         beetle_f(kf, step, &points_turn[4 * k]);
-        const float dev_px_turn = points_turn[4 * k] - px_centre_turn;
-        const float dev_py_turn = points_turn[4 * k + 1] - py_centre_turn;
-        const float dev_v_turn = points_turn[4 * k + 2] - v_centre_turn;
-        const float dev_th_turn = beetle_wrap(points_turn[4 * k + 3] - th_centre_turn, 3.1415927f);
+        const float dev_px_turn = points_turn[4 * k] - px_turn_1;
+        const float dev_py_turn = points_turn[4 * k + 1] - py_turn_1;
+        const float dev_v_turn = points_turn[4 * k + 2] - v_turn_1;
+        const float dev_th_turn = points_turn[4 * k + 3] - th_turn_1;
         points_turn[4 * k] = dev_px_turn;
         points_turn[4 * k + 1] = dev_py_turn;
         points_turn[4 * k + 2] = dev_v_turn;
@@ -509,48 +483,48 @@ beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt)
 
     /* turn: deviations from the mean */
     for (int k = 0; k < 8; k++) {
-        const float t214 = points_turn[4 * k] - mean_px_turn;
-        const float t215 = points_turn[4 * k + 1] - mean_py_turn;
-        const float t216 = points_turn[4 * k + 2] - mean_v_turn;
-        const float t217 = points_turn[4 * k + 3] - mean_th_turn;
-        const float t218 = 0.125f * t217;
-        const float t219 = d_th_turn + t217 * t218;
-        const float t220 = 1.0f / t219;
-        const float t221 = t218 * t220;
-        const float t222 = d_th_turn * t220;
-        const float t223 = 0.125f * t222;
-        const float t210 = t222 * u_px_th_turn + t221 * t214;
-        const float t224 = t214 - t217 * u_px_th_turn;
-        const float t211 = t222 * u_py_th_turn + t221 * t215;
-        const float t225 = t215 - t217 * u_py_th_turn;
-        const float t212 = t222 * u_v_th_turn + t221 * t216;
-        const float t226 = t216 - t217 * u_v_th_turn;
-        const float t227 = t223 * t226;
-        const float t228 = d_v_turn + t226 * t227;
-        const float t229 = 1.0f / t228;
-        const float t230 = t227 * t229;
-        const float t231 = d_v_turn * t229;
-        const float t232 = t223 * t231;
-        const float t208 = t231 * u_px_v_turn + t230 * t224;
-        const float t233 = t224 - t226 * u_px_v_turn;
-        const float t209 = t231 * u_py_v_turn + t230 * t225;
-        const float t234 = t225 - t226 * u_py_v_turn;
-        const float t235 = t232 * t234;
-        const float t236 = d_py_turn + t234 * t235;
-        const float t237 = 1.0f / t236;
-        const float t238 = d_py_turn * t237;
-        const float t239 = t233 - t234 * u_px_py_turn;
-        const float t213 = d_px_turn + t239 * (t232 * t238 * t239);
-        u_px_py_turn = t238 * u_px_py_turn + t235 * t237 * t233;
-        u_px_v_turn = t208;
-        u_py_v_turn = t209;
-        u_px_th_turn = t210;
-        u_py_th_turn = t211;
-        u_v_th_turn = t212;
-        d_px_turn = t213;
-        d_py_turn = t236;
-        d_v_turn = t228;
-        d_th_turn = t219;
+        const float t204 = points_turn[4 * k] - mean_px_turn;
+        const float t205 = points_turn[4 * k + 1] - mean_py_turn;
+        const float t206 = points_turn[4 * k + 2] - mean_v_turn;
+        const float t207 = points_turn[4 * k + 3] - mean_th_turn;
+        const float t208 = 0.125f * t207;
+        const float t209 = d_th_turn + t207 * t208;
+        const float t210 = 1.0f / t209;
+        const float t211 = t208 * t210;
+        const float t212 = d_th_turn * t210;
+        const float t213 = 0.125f * t212;
+        const float t200 = t212 * u_px_th_turn + t211 * t204;
+        const float t214 = t204 - t207 * u_px_th_turn;
+        const float t201 = t212 * u_py_th_turn + t211 * t205;
+        const float t215 = t205 - t207 * u_py_th_turn;
+        const float t202 = t212 * u_v_th_turn + t211 * t206;
+        const float t216 = t206 - t207 * u_v_th_turn;
+        const float t217 = t213 * t216;
+        const float t218 = d_v_turn + t216 * t217;
+        const float t219 = 1.0f / t218;
+        const float t220 = t217 * t219;
+        const float t221 = d_v_turn * t219;
+        const float t222 = t213 * t221;
+        const float t198 = t221 * u_px_v_turn + t220 * t214;
+        const float t223 = t214 - t216 * u_px_v_turn;
+        const float t199 = t221 * u_py_v_turn + t220 * t215;
+        const float t224 = t215 - t216 * u_py_v_turn;
+        const float t225 = t222 * t224;
+        const float t226 = d_py_turn + t224 * t225;
+        const float t227 = 1.0f / t226;
+        const float t228 = d_py_turn * t227;
+        const float t229 = t223 - t224 * u_px_py_turn;
+        const float t203 = d_px_turn + t229 * (t222 * t228 * t229);
+        u_px_py_turn = t228 * u_px_py_turn + t225 * t227 * t223;
+        u_px_v_turn = t198;
+        u_py_v_turn = t199;
+        u_px_th_turn = t200;
+        u_py_th_turn = t201;
+        u_v_th_turn = t202;
+        d_px_turn = t203;
+        d_py_turn = t226;
+        d_v_turn = t218;
+        d_th_turn = t209;
     }
     const float u_px_py_next_turn_1 = u_px_py_turn;
     const float u_px_v_next_turn_1 = u_px_v_turn;
@@ -562,29 +536,29 @@ beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt)
     const float d_py_next_turn_1 = d_py_turn;
     const float d_v_next_turn_1 = d_v_turn;
     const float d_th_next_turn_1 = d_th_turn;
-    const float px_next_turn = px_centre_turn + mean_px_turn;
-    const float py_next_turn = py_centre_turn + mean_py_turn;
-    const float v_next_turn = v_centre_turn + mean_v_turn;
-    const float th_next_turn = th_centre_turn + mean_th_turn;
-    const float t240 = beetle_wrap(th_next_turn, 3.1415927f);
+    const float px_next_turn = px_turn_1 + mean_px_turn;
+    const float py_next_turn = py_turn_1 + mean_py_turn;
+    const float v_next_turn = v_turn_1 + mean_v_turn;
+    const float th_next_turn = th_turn_1 + mean_th_turn;
+    const float t230 = beetle_wrap(th_next_turn, 3.1415927f);
 
     /* turn: guards */
     if (!beetle_finite(px_next_turn + py_next_turn + v_next_turn + th_next_turn + d_px_next_turn_1
         + d_py_next_turn_1 + d_v_next_turn_1 + d_th_next_turn_1)) {
         return BEETLE_NOT_FINITE;
     }
-    const float t241 = 1.0f / (c_run + c_turn);
-    const float mu_run_next = c_run * t241;
-    const float mu_turn_next = c_turn * t241;
+    const float t231 = 1.0f / (c_run + c_turn);
+    const float mu_run_next = c_run * t231;
+    const float mu_turn_next = c_turn * t231;
 
     /* combined state */
-    const float th_base = mu_run_next < mu_turn_next ? t240 : th_run_1;
-    const float t242 = beetle_wrap(th_run_1 - th_base, 3.1415927f);
+    const float th_base = mu_run_next < mu_turn_next ? t230 : th_run_1;
+    const float t232 = beetle_wrap(th_run_1 - th_base, 3.1415927f);
     const float px_all = px_next_run + mu_turn_next * (px_next_turn - px_next_run);
     const float py_all = py_next_run + mu_turn_next * (py_next_turn - py_next_run);
     const float v_all = v_next_run + mu_turn_next * (v_next_turn - v_next_run);
-    const float th_all = th_base + t242
-        + mu_turn_next * (beetle_wrap(t240 - th_base, 3.1415927f) - t242);
+    const float th_all = th_base + t232
+        + mu_turn_next * (beetle_wrap(t230 - th_base, 3.1415927f) - t232);
     if (!beetle_finite(px_all + py_all + v_all + th_all + mu_run_next + mu_turn_next)) {
         return BEETLE_NOT_FINITE;
     }
@@ -609,7 +583,7 @@ beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt)
     kf->modes.turn.x[BEETLE_PX] = px_next_turn;
     kf->modes.turn.x[BEETLE_PY] = py_next_turn;
     kf->modes.turn.x[BEETLE_V] = v_next_turn;
-    kf->modes.turn.x[BEETLE_TH] = t240;
+    kf->modes.turn.x[BEETLE_TH] = t230;
     kf->modes.turn.U[0] = u_px_py_next_turn_1;
     kf->modes.turn.U[1] = u_px_v_next_turn_1;
     kf->modes.turn.U[2] = u_py_v_next_turn_1;
@@ -1054,4 +1028,4 @@ void beetle_get_covariance(const beetle_t *kf, beetle_real_t P[16])
         }
     }
 }
-/* kfgen: body bcbc05caf1a9d38c4f128192ac11cb2a */
+/* kfgen: body 1f031436d17e7eb4d38b9c34a0ac4fae */

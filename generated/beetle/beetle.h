@@ -16,8 +16,8 @@
  * step: given at each step, clamped to at least 0.01 s, at most 2 s
  *
  * RAM 160 bytes a filter. Operations:
- *   predict        586 mul, 464 add, 70 div, 4 sqrt, 27 compare, 10 cos, 1 exp, 47 select, 10 sin,
- *       18 wrap
+ *   predict        581 mul, 460 add, 70 div, 4 sqrt, 27 compare, 9 cos, 1 exp, 47 select, 9 sin, 10
+ *       wrap
  *   update_camera  142 mul, 125 add, 17 div, 8 compare, 2 exp, 4 log, 2 max, 1 min, 4 select, 5
  *       wrap
  * Recommended with gcc, for these long functions without branches:
@@ -126,7 +126,7 @@ beetle_status_t beetle_init(beetle_t *kf);
  * @param dt  time step [s]
  * @return BEETLE_OK, BEETLE_DT_CLAMPED, or an error that leaves *kf as it was
  *
- * 586 mul, 464 add, 70 div, 4 sqrt, 27 compare, 10 cos, 1 exp, 47 select, 10 sin, 18 wrap.
+ * 581 mul, 460 add, 70 div, 4 sqrt, 27 compare, 9 cos, 1 exp, 47 select, 9 sin, 10 wrap.
  */
 beetle_status_t beetle_predict(beetle_t *kf, beetle_real_t dt);
 
@@ -172,4 +172,4 @@ void beetle_get_covariance(const beetle_t *kf, beetle_real_t P[16]);
 #endif
 
 #endif
-/* kfgen: body 7423b208dd8ada05340f18df7921e778 */
+/* kfgen: body 67528fdd37a545a3415a1f103e24faaa */

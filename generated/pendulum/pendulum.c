@@ -137,43 +137,38 @@ pendulum_status_t pendulum_predict(pendulum_t *kf)
     /* sigma points */
     float points[32];
     const float s_angle_angle = kf->S[0];
-    const float t1 = 1.118034f * s_angle_angle;
+    points[0] = 1.118034f * s_angle_angle;
     const float s_rate_angle = kf->S[1];
-    const float t2 = 1.118034f * s_rate_angle;
-    points[0] = t1;
-    points[1] = t2;
+    points[1] = 1.118034f * s_rate_angle;
     points[2] = 0.0f;
     points[3] = 0.0f;
-    points[4] = -t1;
-    points[5] = -t2;
-    points[6] = 0.0f;
-    points[7] = 0.0f;
     points[8] = 0.0f;
     const float s_rate_rate = kf->S[2];
-    const float t3 = 1.118034f * s_rate_rate;
-    points[9] = t3;
+    points[9] = 1.118034f * s_rate_rate;
     points[10] = 0.0f;
     points[11] = 0.0f;
-    points[12] = 0.0f;
-    points[13] = -t3;
-    points[14] = 0.0f;
-    points[15] = 0.0f;
     points[16] = 0.0f;
     points[17] = 0.0f;
     points[18] = 0.3354102f;
     points[19] = 0.0f;
-    points[20] = 0.0f;
-    points[21] = 0.0f;
-    points[22] = -0.3354102f;
-    points[23] = 0.0f;
     points[24] = 0.0f;
     points[25] = 0.0f;
     points[26] = 0.0f;
     points[27] = 0.0559017f;
-    points[28] = 0.0f;
-    points[29] = 0.0f;
-    points[30] = 0.0f;
-    points[31] = -0.0559017f;
+    for (int j = 0; j < 4; j++) {
+        const float part_0 = points[8 * j];
+        points[8 * j] = angle + part_0;
+        points[8 * j + 4] = angle - part_0;
+        const float part_1 = points[8 * j + 1];
+        points[8 * j + 1] = rate + part_1;
+        points[8 * j + 5] = rate - part_1;
+        const float part_2 = points[8 * j + 2];
+        points[8 * j + 2] = part_2;
+        points[8 * j + 6] = -part_2;
+        const float part_3 = points[8 * j + 3];
+        points[8 * j + 3] = part_3;
+        points[8 * j + 7] = -part_3;
+    }
     float centre[4];
     centre[0] = angle;
     centre[1] = rate;
@@ -188,38 +183,34 @@ pendulum_status_t pendulum_predict(pendulum_t *kf)
     float d_rate = 0.0f;
     float d_angle = 0.0f;
 
-    /* points through f; deviations overwrite them */
+    /* points through f, and their deviations */
     for (int k = 0; k < 8; k++) {
-        points[4 * k] = points[4 * k] + angle;
-        points[4 * k + 1] = points[4 * k + 1] + rate;
         pendulum_f(&points[4 * k]);
         const float dev_angle = pendulum_wrap(points[4 * k] - angle_centre, 3.1415927f);
         const float dev_rate = points[4 * k + 1] - rate_centre;
-        points[4 * k] = dev_angle;
-        points[4 * k + 1] = dev_rate;
         shift_angle = shift_angle + dev_angle;
         shift_rate = shift_rate + dev_rate;
-        const float t5 = 0.4f * dev_angle;
-        const float t6 = d_angle + dev_angle * t5;
-        const bool t7 = t6 > 0.0f;
-        const float t8 = t7 ? d_angle / t6 : 1.0f;
-        const float t9 = dev_rate - dev_angle * u_rate_angle;
-        const float t4 = d_rate + t9 * (0.4f * t8 * t9);
-        u_rate_angle = t8 * u_rate_angle + (t7 ? t5 / t6 : 0.0f) * dev_rate;
-        d_rate = t4;
-        d_angle = t6;
+        const float t2 = 0.4f * dev_angle;
+        const float t3 = d_angle + dev_angle * t2;
+        const bool t4 = t3 > 0.0f;
+        const float t5 = t4 ? d_angle / t3 : 1.0f;
+        const float t6 = dev_rate - dev_angle * u_rate_angle;
+        const float t1 = d_rate + t6 * (0.4f * t5 * t6);
+        u_rate_angle = t5 * u_rate_angle + (t4 ? t2 / t3 : 0.0f) * dev_rate;
+        d_rate = t1;
+        d_angle = t3;
     }
     const float mean_angle = 0.4f * shift_angle;
     const float mean_rate = 0.4f * shift_rate;
-    const float t10 = 0.7f * shift_angle;
-    const float t11 = d_angle + mean_angle * t10;
-    const bool t12 = t11 > 0.0f;
-    const float t13 = t12 ? d_angle / t11 : 1.0f;
-    const float t14 = mean_rate - mean_angle * u_rate_angle;
-    const float t0 = d_rate + t14 * (1.75f * t13 * t14);
-    u_rate_angle = t13 * u_rate_angle + (t12 ? t10 / t11 : 0.0f) * mean_rate;
+    const float t7 = 0.7f * shift_angle;
+    const float t8 = d_angle + mean_angle * t7;
+    const bool t9 = t8 > 0.0f;
+    const float t10 = t9 ? d_angle / t8 : 1.0f;
+    const float t11 = mean_rate - mean_angle * u_rate_angle;
+    const float t0 = d_rate + t11 * (1.75f * t10 * t11);
+    u_rate_angle = t10 * u_rate_angle + (t9 ? t7 / t8 : 0.0f) * mean_rate;
     d_rate = t0;
-    d_angle = t11;
+    d_angle = t8;
 
     /* roots */
     const float s_rate_rate_next = sqrtf(d_rate);
@@ -271,89 +262,91 @@ pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t
 
     /* its covariance S = L D L^T */
     const float s_x = seen[2] + 0.0001f;
+    const float t3 = seen[4] + 0.0001f;
     const float y_x = z->x - h_x;
     const float y_y = z->y - h_y;
-    const float t3 = 1.0f / s_x;
-    const float t4 = seen[3] * t3;
-    const float s_y = seen[4] + 0.0001f - t4 * seen[3];
-    const float t5 = y_y - t4 * y_x;
-    const float t6 = seen[6] - t4 * seen[5];
-    const float t7 = seen[8] - t4 * seen[7];
-    const float t8 = y_x * t3;
-    const float t9 = t5 * (1.0f / s_y);
-    const float nis = y_x * t8 + t5 * t9;
+    const float t4 = 1.0f / s_x;
+    const float t5 = seen[3] * t4;
+    const float s_y = t3 - t5 * seen[3];
+    const float t6 = y_y - t5 * y_x;
+    const float t7 = y_x * t4;
+    const bool t8 = 1.9073486e-6f * t3 < s_y;
+    const float t9 = t8 ? seen[6] - t5 * seen[5] : 0.0f;
+    const float t10 = t8 ? seen[8] - t5 * seen[7] : 0.0f;
+    const float t11 = t6 * (t8 ? 1.0f / s_y : 0.0f);
+    const float nis = y_x * t7 + t6 * t11;
 
     /* guards */
     if (!pendulum_finite(y_x + y_y + s_x + s_y)) { return PENDULUM_NOT_FINITE; }
-    if (!(s_x > 0.0f) || !(s_y > 0.0f)) { return PENDULUM_NOT_POSITIVE; }
+    if (!(s_x > 0.0f)) { return PENDULUM_NOT_POSITIVE; }
 
     /* gate */
-    const bool t10 = nis > 13.815511f;
-    if (t10 && kf->gate_count_camera < 10u) {
+    const bool t12 = nis > 13.815511f;
+    if (t12 && kf->gate_count_camera < 10u) {
         kf->nis = nis;
         kf->gate_count_camera = kf->gate_count_camera + 1u;
         return PENDULUM_GATED;
     }
-    if (t10) { flags |= PENDULUM_ANOMALY; }
+    if (t12) { flags |= PENDULUM_ANOMALY; }
 
     /* gain and covariance */
-    const float t11 = 1.0f / sqrtf(s_x);
-    const float t12 = seen[7] * t11;
-    const float t13 = seen[5] * t11;
-    const float t14 = s_angle_angle * s_angle_angle;
-    const float t15 = 3.637979e-12f * t14;
-    const float t16 = t13 * t13;
-    const bool t17 = t15 < t16;
-    const float t18 = t14 - t16;
-    const bool t19 = t17 && t18 <= 1.9073486e-6f * t14;
-    if (t19) { flags |= PENDULUM_REGULARIZED; }
-    const bool t20 = !t19;
-    const bool t21 = t17 && t20;
-    const float t22 = sqrtf(t21 ? t18 : 1.0f);
-    const float t23 = t21 ? 1.0f / s_angle_angle : 0.0f;
-    const float t24 = t13 * t23;
-    const float t25 = t19 ? 0.0f : (t21 ? t22 : s_angle_angle);
-    const float t26 = (s_rate_angle - t24 * t12) * (t21 ? s_angle_angle * (1.0f / t22) : 1.0f);
-    const float t27 = (t21 ? t22 * t23 : 1.0f) * t12 - t24 * t26;
-    const float t28 = s_rate_rate * s_rate_rate;
-    const float t29 = 3.637979e-12f * (t28 + s_rate_angle * s_rate_angle);
-    const float t30 = t27 * t27;
-    const bool t31 = t20 && t29 < t30;
-    const float t32 = t28 - t30;
-    const bool t33 = t31 && t32 <= 1.9073486e-6f * t28;
-    if (t33) { flags |= PENDULUM_REGULARIZED; }
-    const bool t34 = t31 && !t33;
-    const float t35 = t33 ? 0.0f : (t34 ? sqrtf(t34 ? t32 : 1.0f) : s_rate_rate);
-    const float t36 = 1.0f / sqrtf(s_y);
-    const float t37 = t7 * t36;
-    const float t38 = t6 * t36;
-    const float t39 = t38 * t38;
-    const bool t40 = t15 < t39;
-    const float t41 = t25 * t25;
-    const float t42 = t41 - t39;
-    const bool t43 = t40 && t42 <= 1.9073486e-6f * t41;
-    if (t43) { flags |= PENDULUM_REGULARIZED; }
-    const bool t44 = !t43;
-    const bool t45 = t40 && t44;
-    const float t46 = sqrtf(t45 ? t42 : 1.0f);
-    const float t47 = t45 ? 1.0f / t25 : 0.0f;
-    const float t48 = t38 * t47;
-    const float s_angle_angle_next = t43 ? 0.0f : (t45 ? t46 : t25);
-    const float t49 = ((t19 ? 0.0f : t26) - t48 * t37) * (t45 ? t25 * (1.0f / t46) : 1.0f);
-    const float t50 = (t45 ? t46 * t47 : 1.0f) * t37 - t48 * t49;
-    const float s_rate_angle_next = t43 ? 0.0f : t49;
-    const float t51 = t50 * t50;
-    const bool t52 = t44 && t29 < t51;
-    const float t53 = t35 * t35;
-    const float t54 = t53 - t51;
-    const bool t55 = t52 && t54 <= 1.9073486e-6f * t53;
-    if (t55) { flags |= PENDULUM_REGULARIZED; }
-    const bool t56 = t52 && !t55;
-    const float s_rate_rate_next = t55 ? 0.0f : (t56 ? sqrtf(t56 ? t54 : 1.0f) : t35);
+    const float t13 = 1.0f / sqrtf(s_x);
+    const float t14 = seen[7] * t13;
+    const float t15 = seen[5] * t13;
+    const float t16 = s_angle_angle * s_angle_angle;
+    const float t17 = 3.637979e-12f * t16;
+    const float t18 = t15 * t15;
+    const bool t19 = t17 < t18;
+    const float t20 = t16 - t18;
+    const bool t21 = t19 && t20 <= 1.9073486e-6f * t16;
+    if (t21) { flags |= PENDULUM_REGULARIZED; }
+    const bool t22 = !t21;
+    const bool t23 = t19 && t22;
+    const float t24 = sqrtf(t23 ? t20 : 1.0f);
+    const float t25 = t23 ? 1.0f / s_angle_angle : 0.0f;
+    const float t26 = t15 * t25;
+    const float t27 = t21 ? 0.0f : (t23 ? t24 : s_angle_angle);
+    const float t28 = (s_rate_angle - t26 * t14) * (t23 ? s_angle_angle * (1.0f / t24) : 1.0f);
+    const float t29 = (t23 ? t24 * t25 : 1.0f) * t14 - t26 * t28;
+    const float t30 = s_rate_rate * s_rate_rate;
+    const float t31 = 3.637979e-12f * (t30 + s_rate_angle * s_rate_angle);
+    const float t32 = t29 * t29;
+    const bool t33 = t22 && t31 < t32;
+    const float t34 = t30 - t32;
+    const bool t35 = t33 && t34 <= 1.9073486e-6f * t30;
+    if (t35) { flags |= PENDULUM_REGULARIZED; }
+    const bool t36 = t33 && !t35;
+    const float t37 = t35 ? 0.0f : (t36 ? sqrtf(t36 ? t34 : 1.0f) : s_rate_rate);
+    const float t38 = 1.0f / sqrtf(t8 ? s_y : 1.0f);
+    const float t39 = t10 * t38;
+    const float t40 = t9 * t38;
+    const float t41 = t40 * t40;
+    const bool t42 = t17 < t41;
+    const float t43 = t27 * t27;
+    const float t44 = t43 - t41;
+    const bool t45 = t42 && t44 <= 1.9073486e-6f * t43;
+    if (t45) { flags |= PENDULUM_REGULARIZED; }
+    const bool t46 = !t45;
+    const bool t47 = t42 && t46;
+    const float t48 = sqrtf(t47 ? t44 : 1.0f);
+    const float t49 = t47 ? 1.0f / t27 : 0.0f;
+    const float t50 = t40 * t49;
+    const float s_angle_angle_next = t45 ? 0.0f : (t47 ? t48 : t27);
+    const float t51 = ((t21 ? 0.0f : t28) - t50 * t39) * (t47 ? t27 * (1.0f / t48) : 1.0f);
+    const float t52 = (t47 ? t48 * t49 : 1.0f) * t39 - t50 * t51;
+    const float s_rate_angle_next = t45 ? 0.0f : t51;
+    const float t53 = t52 * t52;
+    const bool t54 = t46 && t31 < t53;
+    const float t55 = t37 * t37;
+    const float t56 = t55 - t53;
+    const bool t57 = t54 && t56 <= 1.9073486e-6f * t55;
+    if (t57) { flags |= PENDULUM_REGULARIZED; }
+    const bool t58 = t54 && !t57;
+    const float s_rate_rate_next = t57 ? 0.0f : (t58 ? sqrtf(t58 ? t56 : 1.0f) : t37);
 
     /* state */
-    const float rate_next = kf->x[PENDULUM_RATE] + seen[7] * t8 + t7 * t9;
-    const float angle_next = angle + seen[5] * t8 + t6 * t9;
+    const float rate_next = kf->x[PENDULUM_RATE] + seen[7] * t7 + t10 * t11;
+    const float angle_next = angle + seen[5] * t7 + t9 * t11;
 
     /* guards */
     if (!pendulum_finite(nis + angle_next + rate_next)) { return PENDULUM_NOT_FINITE; }
@@ -477,4 +470,4 @@ void pendulum_get_sqrt_covariance(const pendulum_t *kf, pendulum_real_t S[4])
         }
     }
 }
-/* kfgen: body 2c0c421374dcf23af6392fcb5675fae4 */
+/* kfgen: body a950f2fb77644005e84aa629f880242e */

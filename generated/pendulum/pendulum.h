@@ -12,7 +12,7 @@
  *
  * RAM 28 bytes a filter. Operations:
  *   predict        240 mul, 296 add, 18 div, 2 sqrt, 9 compare, 18 select, 36 sin, 9 wrap
- *   update_camera  102 mul, 84 add, 8 div, 6 sqrt, 12 compare, 5 cos, 20 select, 5 sin, 1 wrap
+ *   update_camera  103 mul, 84 add, 8 div, 6 sqrt, 12 compare, 5 cos, 24 select, 5 sin, 1 wrap
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * 5beda3b110ffd765cf11df607a6275016c21b0230f7c18e5ac7b7f713e7a4ea0
@@ -98,7 +98,7 @@ pendulum_status_t pendulum_predict(pendulum_t *kf);
  * @return PENDULUM_OK, PENDULUM_ANOMALY, PENDULUM_REGULARIZED, PENDULUM_GATED, or an error that
  *     leaves *kf as it was
  *
- * 102 mul, 84 add, 8 div, 6 sqrt, 12 compare, 5 cos, 20 select, 5 sin, 1 wrap.
+ * 103 mul, 84 add, 8 div, 6 sqrt, 12 compare, 5 cos, 24 select, 5 sin, 1 wrap.
  */
 pendulum_status_t pendulum_update_camera(pendulum_t *kf, const pendulum_camera_t *z);
 
@@ -150,4 +150,4 @@ void pendulum_get_sqrt_covariance(const pendulum_t *kf, pendulum_real_t S[4]);
 #endif
 
 #endif
-/* kfgen: body a4e73f17827c466ace58b7dac51b4f19 */
+/* kfgen: body 0621a56035369541abaaecc096cda948 */

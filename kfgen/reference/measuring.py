@@ -9,25 +9,25 @@ import numpy as np
 
 from kfgen.reference.adapt import Adaptation
 from kfgen.reference.algorithm import Estimate
-from kfgen.reference.carried import carried_by_sensor
-from kfgen.reference.cloud import Cloud, Drawing, average, centre, magnitude
+from kfgen.reference.carried import carried_by_sensor, wrapped_by_sensor
+from kfgen.reference.cloud import Cloud, Drawing
 from kfgen.reference.dual import Matrix, Vector, values
 from kfgen.reference.joseph import PLAIN, Rules, Update, update
 from kfgen.reference.linalg import EPS, check_covariance, symmetric, udu
 from kfgen.reference.model import Model
+from kfgen.reference.pivots import Pivots, judge, pivots
 from kfgen.reference.sensor import Reading
-from kfgen.reference.sigma_points import upper_root
-from kfgen.reference.spread import Pivots, Spread, pivots, settled
+from kfgen.reference.sigma_points import Images, upper_root
 from kfgen.reference.status import Status, StepError
 
 
 @dataclass(frozen=True)
 class Predicted:
-    """A reading as a cloud predicts it: its mean z (k), its spread, its covariances with the state, cross (n, k),
-    and with the carried noises, noise (q, k)."""
+    """A reading as a cloud predicts it: images of the points (N, k), their covariances with each other, spread (k, k),
+    with the state, cross (n, k), and with the carried noises, noise (q, k)."""
 
-    z: Vector
-    spread: Spread
+    images: Images
+    spread: Matrix
     cross: Matrix
     noise: Matrix
 
@@ -36,15 +36,14 @@ class Predicted:
 class Measured:
     """A reading against its prediction.
 
-    y (k): the innovation. R (k, k): the covariance of its noise, raised to the innovation floor. noise: the
-    adapted R (m, m) of the whole sensor that went into it, or None. S: the factors of the innovation
-    covariance. nis: y^T S^-1 y.
+    y (k): the innovation. exact: whether some direction of it has no noise. noise: the adapted R (m, m) of the whole
+    sensor that went into it, or None. S: the factors of the innovation covariance. nis: y^T S^-1 y.
     """
 
     cloud: Cloud
     predicted: Predicted
     y: Vector
-    R: Matrix
+    exact: bool
     noise: Matrix | None
     S: Pivots
     nis: float
@@ -69,6 +68,7 @@ class Measuring:
     def __init__(self, model: Model, drawing: Drawing, adaptation: Adaptation, plain: Rules = PLAIN) -> None:
         self.drawing, self.adaptation, self.plain = drawing, adaptation, plain
         self._carried: dict[str, tuple[int, ...]] = {}
+        self._wrapped = {sensor.name: wrapped_by_sensor(model, sensor) for sensor in model.spec.measurements}
         for sensor in model.spec.measurements:
             names = [noise.name for noise in sensor.noise]
             # custom points have columns for the states only: all noise inputs stay M Re M^T
@@ -83,7 +83,7 @@ class Measuring:
     def residual(self, x: Vector, P: Matrix, reading: Reading) -> Vector:
         """The residual (k) of the reading against points drawn from x (n) and P (n, n). Raises NOT_FINITE."""
         seen = self._predicted(x, reading, self.draw(x, P, reading))
-        return reading.sensor.innovation(seen.z, x, reading)
+        return reading.sensor.innovation(seen.images.mean, x, reading)
 
     def whole(self, estimate: Estimate, reading: Reading, cloud: Cloud, noise: Matrix | None = None) -> Measured:
         """The innovation and its covariance S = R + spread of the predicted readings.
@@ -92,23 +92,22 @@ class Measuring:
         """
         seen = self._predicted(estimate.x, reading, cloud)
         R, noise = self._noise(estimate, reading, cloud, seen, noise)
-        y = reading.sensor.innovation(seen.z, estimate.x, reading)
-        S, rounding = seen.spread.covariance + R, seen.spread.rounding
+        y = reading.sensor.innovation(seen.images.mean, estimate.x, reading)
+        S = symmetric(seen.spread + R)
         if not np.isfinite(S).all():
             raise StepError(Status.NOT_FINITE)
         check_covariance(self._input_covariance(estimate.x, reading, self._within(cloud, reading)))
         exact = bool(np.any(udu(R)[1] == 0.0))
-        S = settled(S, rounding)
+        if cloud.weights.negative:
+            judge(S, seen.images.size + R.diagonal())
+        smallest = 8.0 * len(S) * EPS * S.diagonal()
         lack = np.maximum(self.plain.floor - S.diagonal(), 0.0) if self.plain.floor > 0.0 else np.zeros(len(S))
         flags = Status.REGULARIZED if np.any(lack) else Status.OK
-        S, R = S + np.diag(lack), R + np.diag(lack)
-        # without noise in some direction a pivot of S may be nothing but the rounding of the points
-        smallest = 8.0 * len(S) * EPS * S.diagonal() + (rounding.diagonal() if exact else 0.0)
-        factors = pivots(S, smallest)
+        factors = pivots(S + np.diag(lack), smallest)
         nis = float(np.sum(factors.squares(y)))
         if not math.isfinite(nis):
             raise StepError(Status.NOT_FINITE)
-        return Measured(cloud, seen, y, R, noise, factors, nis, flags)
+        return Measured(cloud, seen, y, exact, noise, factors, nis, flags)
 
     def scalars(self, estimate: Estimate, reading: Reading, cloud: Cloud) -> Scalars:
         """The measurement matrix that regression on the points gives: H = Pxz^T P^-1; carried noises likewise.
@@ -121,7 +120,7 @@ class Measuring:
         C = self._input_covariance(estimate.x, reading, self._within(cloud, reading))
         H, M = regression(estimate.P, seen.cross), regression(C, seen.noise)
         R = symmetric(R + M @ C @ M.T)
-        y = reading.sensor.innovation(seen.z, estimate.x, reading)
+        y = reading.sensor.innovation(seen.images.mean, estimate.x, reading)
         if not (np.isfinite(H).all() and np.isfinite(R).all()):
             raise StepError(Status.NOT_FINITE)
         check_covariance(C)
@@ -148,7 +147,7 @@ class Measuring:
         """R (k, k) with M Re M^T of the noises that are not carried, and the adapted R (m, m) in it, if any."""
         sensor, x, used = reading.sensor, estimate.x, reading.used
         if self.adaptation.R and noise is None:
-            noise = self.adaptation.noise(estimate.adapted, reading, seen.spread.covariance)
+            noise = self.adaptation.noise(estimate.adapted, reading, seen.spread)
         R = sensor.noise(x, reading.context, used) if noise is None else noise[np.ix_(used, used)]
         carried = self._within(cloud, reading)
         rest = [i for i in range(len(sensor.spec.noise)) if i not in carried]
@@ -159,11 +158,12 @@ class Measuring:
     def _predicted(self, x: Vector, reading: Reading, cloud: Cloud) -> Predicted:
         """The reading that a cloud around x (n) predicts.
 
-        Periodic components, and those with a residual of their own, are averaged by their differences from the
-        image of the centre point; a set without one has h(x) evaluated beside, if there is such a component.
-        Raises StepError NOT_FINITE.
+        Differences are those from the image of the point at the mean; a set without one has it evaluated beside, if
+        a component is periodic or has its own residual. Linear ones are not wrapped; images that are the same but for
+        rounding have no spread. Raises StepError NOT_FINITE.
         """
-        sensor, weights, carried = reading.sensor, cloud.weights, self._within(cloud, reading)
+        sensor, carried = reading.sensor, self._within(cloud, reading)
+        wrapped = self._wrapped[sensor.name]
 
         def image(point: Vector, e: Vector) -> Vector:
             noise = np.zeros(len(sensor.spec.noise))
@@ -171,16 +171,27 @@ class Measuring:
             at = [float(v) for v in point]
             return values(sensor.predict(at, [float(v) for v in noise], reading.context, reading.used))
 
-        images = np.array([image(point, e) for point, e in zip(cloud.points, cloud.noise, strict=True)])
-        if not np.isfinite(images).all():
+        raw = np.array([image(point, e) for point, e in zip(cloud.points, cloud.noise, strict=True)])
+        middle = cloud.weights.centre
+        beside = middle is None and any(sensor.turns[i] for i in reading.used)
+        base = image(x, np.zeros(len(carried))) if beside else raw[middle or 0]
+        if not (np.isfinite(raw).all() and np.isfinite(base).all()):
             raise StepError(Status.NOT_FINITE)
-        bent = [sensor.bent[i] for i in reading.used]
-        base = centre(images, weights, bent, lambda: image(x, np.zeros(len(carried))))
-        differences = np.array([sensor.difference(z, base, x, reading) for z in images])
-        terms = magnitude(lambda point: sensor.jacobian(point, reading), cloud.points)
-        z, around = average(images, base, differences, weights, terms)
-        weighted = weights.wc[:, None] * around.deviations
-        return Predicted(z, around, cloud.deviations.T @ weighted, cloud.noise.T @ weighted)
+        e = np.array([sensor.difference(z, base, x, reading, wrapped) for z in raw])
+        e = np.where(np.max(np.abs(e), axis=0) <= self._rounding(reading, cloud, raw), 0.0, e)
+        images = Images(cloud.weights, base, e, cloud.weights.wm @ e)
+        spread = symmetric(images.covariance(images))
+        return Predicted(images, spread, cloud.states.covariance(images), cloud.noises.covariance(images))
+
+    def _rounding(self, reading: Reading, cloud: Cloud, raw: Matrix) -> Vector:
+        """By how much images (k) may differ by the rounding of what h adds up in them: |h| + |H| |x|.
+
+        H is the smaller one of two points: a pole near one of them says nothing.
+        """
+        H = np.fmin.reduce([np.abs(reading.sensor.jacobian(cloud.points[i], reading)) for i in (0, -1)])
+        terms: Vector = np.where(np.isfinite(H), H, 0.0) @ np.max(np.abs(cloud.points), axis=0)
+        size: Vector = 16.0 * EPS * (np.max(np.abs(raw), axis=0) + terms)
+        return size
 
 
 def regression(P: Matrix, cross: Matrix) -> Matrix:

@@ -65,7 +65,7 @@ class SensorModel:
         ]
         own = {c.name: c.variance for c in sensor.components if c.variance is not None}
         self._R = model.covariance(own if sensor.R is None else sensor.R, self.components)
-        self.bent = tuple(c.residual is not None or c.period is not None for c in sensor.components)
+        self.turns = tuple(c.residual is not None or c.period is not None for c in sensor.components)
         self._noises = [noise.name for noise in sensor.noise]
         predicted = [component.h for component in sensor.components]
         self._Re = model.noise_covariance(in_use(model.spec, sensor.noise, predicted), sensor.noise_covariance)
@@ -129,10 +129,13 @@ class SensorModel:
         """z - h of the components in use, as `difference` has it; h (k) is the prediction made at x (n)."""
         return self.difference(reading.z[list(reading.used)], h, x, reading)
 
-    def difference(self, z: Vector, h: Vector, x: Vector, reading: Reading) -> Vector:
+    def difference(
+        self, z: Vector, h: Vector, x: Vector, reading: Reading, wrapped: Sequence[int] | None = None
+    ) -> Vector:
         """z - h (k) of the components in use, wrapped where periodic, or by the component's own residual.
 
-        An own residual may use x (n) as h does. Raises StepError NOT_FINITE.
+        wrapped: the components that are, if not all. An own residual may use x (n) as h does. Raises StepError
+        NOT_FINITE.
         """
         environment = self.model.environment(reading.context, x)
         y = np.zeros(len(reading.used))
@@ -143,7 +146,7 @@ class SensorModel:
                 environment[self.model.scope.slots[Z]] = measured
                 environment[self.model.scope.slots[PREDICTED]] = predicted
                 y[k] = value_of(residual(environment))
-            elif period is not None:
+            elif period is not None and (wrapped is None or i in wrapped):
                 y[k] = wrap(measured - predicted, period)
             else:
                 y[k] = measured - predicted

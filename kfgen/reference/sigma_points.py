@@ -21,14 +21,69 @@ class PointSet:
     """N points in L dimensions of unit variance.
 
     offsets (N, L): from the mean. wm (N), wc (N): their weights in means and covariances. centre: the row of
-    the point at the mean, None where the set has none. moment (L, L): the weighted covariance of the offsets.
+    the point at the mean, None where the set has none. shift: beta - alpha^2 of merwe and wiki, else None.
     """
 
     offsets: Matrix
     wm: Vector
     wc: Vector
     centre: int | None
-    moment: Matrix
+    shift: float | None = None
+
+    @property
+    def others(self) -> Vector:
+        """wm (N) with 0 for the point at the mean."""
+        return np.array([0.0 if i == self.centre else w for i, w in enumerate(self.wm)])
+
+    @property
+    def negative(self) -> bool:
+        """Whether a covariance is gathered with negative weights."""
+        return bool(np.any(self.wc < 0.0)) if self.shift is None else self.shift < 0.0
+
+    @property
+    def exact(self) -> bool:
+        """Whether the points have the covariance that they are drawn of: custom ones may have another."""
+        moment = (self.wc[:, None] * self.offsets).T @ self.offsets
+        return self.shift is not None or np.allclose(moment, np.eye(len(moment)), atol=1e-12)
+
+
+@dataclass(frozen=True)
+class Images:
+    """What points became in k coordinates: base (k) the image of the point at the mean; e (N, k): their differences
+    from it; d (k): the mean of these."""
+
+    weights: PointSet
+    base: Vector
+    e: Matrix
+    d: Vector
+
+    @property
+    def mean(self) -> Vector:
+        return self.base + self.d
+
+    @property
+    def deviations(self) -> Matrix:
+        """From the mean (N, k)."""
+        return self.e - self.d
+
+    def covariance(self, other: Images) -> Matrix:
+        """Their covariance (k, l) with those of the same points elsewhere: sum wc dX dY^T.
+
+        Of merwe and wiki as w sum e_i e_i^T + (beta - alpha^2) d d^T, which is the same without weights of
+        -1/alpha^2.
+        """
+        weights = self.weights
+        if weights.shift is None:
+            return (weights.wc[:, None] * self.deviations).T @ other.deviations
+        return (weights.others[:, None] * self.e).T @ other.e + weights.shift * np.outer(self.d, other.d)
+
+    @property
+    def size(self) -> Vector:
+        """The absolute values (k) of what is added up in the variances."""
+        weights = self.weights
+        if weights.shift is None:
+            return np.abs(weights.wc) @ self.deviations**2
+        return weights.others @ self.e**2 + abs(weights.shift) * self.d**2
 
 
 class SigmaRule:
@@ -42,6 +97,7 @@ class SigmaRule:
         self._alpha, self._beta, self._kappa = (
             None if entry is None else model.number(entry) for entry in (points.alpha, points.beta, points.kappa)
         )
+        self._shift = None if self._alpha is None or self._beta is None else self._beta - self._alpha**2
         self._sets: dict[int, PointSet] = {}
         if self.own:
             assert points.points is not None
@@ -51,11 +107,7 @@ class SigmaRule:
             centres = np.flatnonzero(~np.any(offsets, axis=1))
             centre = int(centres[0]) if len(centres) else None
             wm, wc = _numbers(model, points.wm), _numbers(model, points.wc)
-            moment = (offsets * wc[:, None]).T @ offsets
-            # of weights written as decimals: what differs from the unit matrix by their rounding is meant to be it
-            unit = np.eye(model.n)
-            moment = np.where(np.abs(moment - unit) < 1e-12, unit, moment)
-            self._sets[model.n] = PointSet(offsets, wm, wc, centre, moment)
+            self._sets[model.n] = PointSet(offsets, wm, wc, centre)
 
     def points(self, dimensions: int) -> PointSet:
         """The points in so many dimensions, L: x, then x + and x - the columns of sqrt(gamma) times the root."""
@@ -67,11 +119,11 @@ class SigmaRule:
         gamma, wm0, wc0, wm, wc = self._weights(L)
         columns = np.sqrt(gamma) * np.eye(L)
         if self._kind == "cubature":
-            return PointSet(np.vstack([columns, -columns]), np.full(2 * L, wm), np.full(2 * L, wc), None, np.eye(L))
+            return PointSet(np.vstack([columns, -columns]), np.full(2 * L, wm), np.full(2 * L, wc), None)
         offsets = np.vstack([np.zeros((1, L)), columns, -columns])
         means, spreads = np.full(2 * L + 1, wm), np.full(2 * L + 1, wc)
         means[0], spreads[0] = wm0, wc0
-        return PointSet(offsets, means, spreads, 0, np.eye(L))
+        return PointSet(offsets, means, spreads, 0, self._shift)
 
     def _weights(self, L: int) -> tuple[float, float, float, float, float]:
         """gamma, the weights of the centre, those of the others."""

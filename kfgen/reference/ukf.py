@@ -2,7 +2,7 @@
 
 Julier & Uhlmann 2004; van der Merwe 2004, algorithms 2.1 and 3.1; Sarkka & Svensson 2023, algorithm 8.17. The
 forms of the covariance differ in the root that spreads the points (and so in the result, for what is not
-linear), in where the floor and ceiling take hold, and in the square root's flag where a downdate meets zero.
+linear), and in the square root's flag where a downdate meets zero.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from dataclasses import replace
 import numpy as np
 
 from kfgen.reference.algorithm import Algorithm, Correction, Estimate, Innovation
-from kfgen.reference.carried import carried_by_process
+from kfgen.reference.carried import carried_by_process, wrapped_by_process
 from kfgen.reference.chi2 import chi2_quantile
-from kfgen.reference.cloud import Cloud, Drawing, average, centre, magnitude, wrapped
+from kfgen.reference.cloud import Cloud, Drawing
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.joseph import update
 from kfgen.reference.linalg import EPS, symmetric
 from kfgen.reference.measuring import Measured, Measuring, Scalars
-from kfgen.reference.model import Context, Model
+from kfgen.reference.model import Context, Model, wrap
+from kfgen.reference.pivots import bounded, downdated, judge, pivots
 from kfgen.reference.process import Process
 from kfgen.reference.rules import Treatment
 from kfgen.reference.sensor import Reading
-from kfgen.reference.sigma_points import lower_root
-from kfgen.reference.spread import Spread, downdated, pivots, settled, spread
+from kfgen.reference.sigma_points import Images, lower_root
 from kfgen.reference.status import Status, StepError
 from kfgen.spec import DOUBLE
 from kfgen.spec.types import Adaptive
@@ -49,6 +49,7 @@ class Ukf(Algorithm):
         held = [noise.name for noise in model.spec.noise if not noise.density]
         self._places = [held.index(name) for name in self._carried]
         self._held = len(held)
+        self._wrapped = wrapped_by_process(model)
         reject = options.reject
         self._rejects = reject is not None
         self._reject = None if reject is None or isinstance(reject, str) else model.scope.compile(reject)
@@ -62,48 +63,49 @@ class Ukf(Algorithm):
         x = estimate.x
         noise = self.process.disturbance(x, context, self._carried)
         cloud = self.drawing.draw(x, estimate.P, noise.carried)
-        weights = cloud.weights
-        raw, flags = self._images(cloud, context)
-        images = np.array([self.model.clip(image) for image in raw])
-        bent = [i in self.model.periods for i in range(self.model.n)]
-
-        def beside() -> Vector:
-            point = self.model.clip(x)
-            return self.model.clip(self.process.advance(point, np.zeros(self._held), context))
-
-        base = centre(images, weights, bent, beside)
-        terms = magnitude(lambda point: self.process.jacobian(point, context), cloud.points)
-        mean, around = average(images, base, wrapped(images - base, self.model), weights, terms)
-        P = around.covariance + noise.added
-        if not (np.isfinite(mean).all() and np.isfinite(P).all()):
+        images, flags = self._images(cloud, context)
+        P = symmetric(images.covariance(images)) + noise.added
+        if not (np.isfinite(images.mean).all() and np.isfinite(P).all()):
             raise StepError(Status.NOT_FINITE)
         noise.judge()
-        P, gone = self._spread_as_root(P, around, weights.wc, noise.added)
-        x, P, more = self._finish(mean, P, around.rounding, context)
+        if cloud.weights.negative:
+            judge(P, images.size + noise.added.diagonal())
+            P = bounded(P, np.zeros(self.model.n))
+        P, gone = self._as_root(P, images, noise.added)
+        mean, P, more = self.limits.finish(images.mean, P, context)
         kept = None
         if self.keeps and not more:  # points that a floor or ceiling contradicts are none of this estimate
             # angles of points near the mean that is stored, which was wrapped
-            turns = np.where(bent, self.model.wrap(mean) - mean, 0.0)
-            near = np.where(bent, mean + around.deviations + turns, images)
-            none, rest = np.zeros((len(near), 0)), P - around.covariance
-            kept = Cloud(weights, near, none, around.deviations, around.errors, around.drift, rest)
-        return replace(estimate, x=x, P=P, memory=kept), flags | gone | more
+            turn = np.array([mean[i] - images.mean[i] if i in self.model.periods else 0.0 for i in range(len(mean))])
+            kept = Cloud(images.base + images.e + turn, np.zeros((len(images.e), 0)), images)
+        return replace(estimate, x=mean, P=P, memory=kept), flags | gone | more
 
-    def _images(self, cloud: Cloud, context: Context) -> tuple[Matrix, Status]:
-        """f at the points (N, n); those that are rejected replaced by f at the centre. Raises NOT_FINITE."""
-        images = []
+    def _images(self, cloud: Cloud, context: Context) -> tuple[Images, Status]:
+        """f at the points, within the bounds; those that are rejected replaced by f at the centre.
+
+        A set without a point at the mean has f evaluated there beside, if something is to be wrapped. Raises
+        NOT_FINITE.
+        """
+        raw, model = [], self.model
         for point, values in zip(cloud.points, cloud.noise, strict=True):
             w = np.zeros(self._held)
             w[self._places] = values
-            images.append(self.process.advance(point, w, context))
+            raw.append(self.process.advance(point, w, context))
         flags, middle = Status.OK, cloud.weights.centre
-        if self._rejects and middle is not None:
-            for i, image in enumerate(images):
+        base = raw[middle or 0]
+        if middle is None and self._wrapped:
+            base = self.process.advance(model.clip(cloud.states.base), np.zeros(self._held), context)
+        if self._rejects:
+            for i, image in enumerate(raw):
                 if i != middle and self._rejected(image, context):
-                    images[i], flags = images[middle], Status.POINT_REJECTED
-        if not np.isfinite(images).all():
+                    raw[i], flags = base, Status.POINT_REJECTED
+        if not (np.isfinite(raw).all() and np.isfinite(base).all()):
             raise StepError(Status.NOT_FINITE)
-        return np.array(images), flags
+        base = model.clip(base)
+        e = np.array([model.clip(image) for image in raw]) - base
+        for i in self._wrapped:
+            e[:, i] = [wrap(float(difference), model.periods[i]) for difference in e[:, i]]
+        return Images(cloud.weights, base, e, cloud.weights.wm @ e), flags
 
     def _rejected(self, image: Vector, context: Context) -> bool:
         """Whether the spec rejects the image (n) of a point, as f left it; t is that of the step's start."""
@@ -111,31 +113,21 @@ class Ukf(Algorithm):
             return True
         return self._reject is not None and bool(self._reject(self.model.environment(context, image)))
 
-    def _spread_as_root(self, P: Matrix, around: Spread, wc: Vector, added: Matrix) -> tuple[Matrix, Status]:
+    def _as_root(self, P: Matrix, images: Images, added: Matrix) -> tuple[Matrix, Status]:
         """P (n, n) of a prediction as the square-root form has it (van der Merwe & Wan 2001, equations 20, 21):
-        the root of what has positive weights, then a downdate for each point with a negative one."""
-        if self.model.spec.filter.covariance != "sqrt" or np.all(wc >= 0.0):
+        the root of what has positive weights, then a downdate for each term with a negative one."""
+        weights = images.weights
+        if self.model.spec.filter.covariance != "sqrt" or not weights.negative:
             return P, Status.OK
-        plus, minus, D = wc > 0.0, wc < 0.0, around.deviations
-        S, gone = lower_root(symmetric((wc[plus, None] * D[plus]).T @ D[plus] + added)), False
-        for weight, deviation in zip(np.sqrt(-wc[minus]), D[minus], strict=True):
-            S, zero = downdated(S, weight * deviation, weight * (around.errors + around.drift) + _rounding(P))
+        if weights.shift is not None:
+            terms = math.sqrt(-weights.shift) * images.d[None, :]
+        else:
+            terms = np.sqrt(np.maximum(-weights.wc, 0.0))[:, None] * images.deviations
+        S, gone = lower_root(symmetric(P + terms.T @ terms)), False
+        for term in terms:
+            S, zero = downdated(S, term, _rounding(P))
             gone = gone or zero
         return (S @ S.T, Status.REGULARIZED) if gone else (P, Status.OK)
-
-    def _finish(self, x: Vector, P: Matrix, rounding: Matrix, context: Context) -> tuple[Vector, Matrix, Status]:
-        """What a step stores; P (n, n) is indefinite only by `rounding` (n, n), else NOT_POSITIVE is raised.
-
-        Factored forms must be definite to be factored; a full P is judged as its floor leaves it.
-        """
-        if not (np.isfinite(x).all() and np.isfinite(P).all()):
-            raise StepError(Status.NOT_FINITE)
-        full = self.model.spec.filter.covariance == "full"
-        x, P, flags = self.limits.finish(x, P if full else settled(P, rounding), context)
-        P = settled(P, rounding) if full else P
-        if not np.isfinite(P).all():
-            raise StepError(Status.NOT_FINITE)
-        return x, P, flags
 
     # --- update
 
@@ -173,32 +165,33 @@ class Ukf(Algorithm):
         threshold = _threshold(self.model, adaptive, used)
         if measured.nis <= threshold:
             return 0.0
-        known = pivots(measured.predicted.spread.covariance, self._known * measured.S.D)
+        known = pivots(measured.predicted.spread, self._known * measured.S.D)
         terms = known.squares(measured.y)[measured.S.D > 0.0]
         return float(np.sum(terms)) * (1.0 / threshold - 1.0 / measured.nis)
 
     def _correct(self, estimate: Estimate, reading: Reading, measured: Measured, flags: Status) -> Correction:
-        """The update with the whole vector.
+        """The update with the whole vector: P - K S K^T.
 
-        With K = Pxz S^-1, P - K S K^T is the spread of the deviations dX - K dz, + K R K^T, + what P has beside
-        the spread of dX: a sum in which rounding cannot make an exact measurement's variance negative.
+        Without noise in some direction, a variance that an exact measurement leaves is nothing but rounding.
         """
-        cloud, around = measured.cloud, measured.predicted.spread
+        context, n = reading.context, self.model.n
         K = measured.S.gain(measured.predicted.cross)
-        steps = around.deviations @ K.T
-        size = np.max(np.abs(cloud.deviations) + np.abs(around.deviations) @ np.abs(K.T), axis=0)
-        errors = cloud.errors + np.abs(K) @ around.errors + 8.0 * EPS * size
-        drift = cloud.drift + np.abs(K) @ around.drift
-        left = spread(cloud.deviations - steps, errors, drift, cloud.weights.wc)
-        P = cloud.rest + left.covariance + symmetric(K @ measured.R @ K.T)
+        P = symmetric(estimate.P - K @ measured.S.matrix @ K.T)
+        if not np.isfinite(P).all():
+            raise StepError(Status.NOT_FINITE)
+        weights = measured.cloud.weights
+        definite = weights.exact and not weights.negative
+        if not definite:
+            judge(P, 2.0 * estimate.P.diagonal())
+        P = bounded(P, (8.0 * n * EPS if measured.exact else 0.0) * estimate.P.diagonal())
         if self.model.spec.filter.covariance == "sqrt":
             S, gone = lower_root(estimate.P), False
-            for w in (K @ measured.S.root).T:
-                S, zero = downdated(S, w, _rounding(estimate.P))
+            for w in (K @ measured.S.L * np.sqrt(measured.S.D)).T:
+                S, zero = downdated(S, w, _rounding(estimate.P), definite)
                 gone = gone or zero
             if gone:
                 P, flags = S @ S.T, flags | Status.REGULARIZED
-        x, P, more = self._finish(estimate.x + K @ measured.y, P, left.rounding, reading.context)
+        x, P, more = self.limits.finish(estimate.x + K @ measured.y, P, context)
         D = measured.S.D[measured.S.D > 0.0]
         log_det = float(np.sum(np.log(2.0 * math.pi * D)))
         terms = float(np.sum(measured.S.squares(measured.y)))

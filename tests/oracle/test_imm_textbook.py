@@ -169,7 +169,7 @@ def test_mixed_banks_around_single_filters(types):
         assert_same(kf, hand)
         z = np.array([np.hypot(*x[:2]), np.arctan2(x[1], x[0])]) + rng.normal(size=2) * [0.5, 0.02]
         if k % 17 == 16:
-            z[0] += 12.0
+            z[0] += 6.0
         if k % 3 == 0:
             seen |= Status(status := kf.update("radar", z))
             assert status == hand.update("radar", z)

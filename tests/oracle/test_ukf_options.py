@@ -10,7 +10,7 @@ from problems import CV4, RADAR, one_state
 from scipy.stats import chi2
 
 from kfgen.reference import Status, reference
-from kfgen.reference.spread import downdated, settled, spread
+from kfgen.reference.pivots import bounded, downdated, judge
 from kfgen.reference.status import StepError
 from kfgen.spec import loads
 
@@ -413,9 +413,13 @@ def test_downdate():
 def test_rounding_is_told_from_what_is_indefinite():
     P = np.array([[1.0, 1.0], [1.0, 1.0 - 1e-9]])
     with pytest.raises(StepError):
-        settled(P, np.zeros((2, 2)))
-    near = settled(P, np.full((2, 2), 1e-9))
-    assert np.min(np.linalg.eigvalsh(near)) > -1e-15
-    np.testing.assert_allclose(near, P, atol=1e-9)
-    around = spread(np.array([[0.0, 1e-9], [1.0, -1e-9]]), np.array([0.0, 1e-9]), np.zeros(2), np.array([-1.0, 1.0]))
-    np.testing.assert_array_equal(around.covariance, [[1.0, 0.0], [0.0, 0.0]])
+        judge(P, np.ones(2))
+    judge(P, np.array([1.0, 1e6]))
+    judge(np.diag([1.0, 0.0]), np.array([1.0, 0.0]))
+
+
+def test_variances_are_none_up_to_their_rounding():
+    P = np.array([[4.0, 1.0, 1.0], [1.0, 1e-15, 1.0], [1.0, 1.0, -1e-15]])
+    np.testing.assert_array_equal(bounded(P, np.zeros(3))[:2, :2], P[:2, :2])
+    np.testing.assert_array_equal(bounded(P, np.zeros(3))[2], np.zeros(3))
+    np.testing.assert_array_equal(bounded(P, np.full(3, 1e-14)), np.diag([4.0, 0.0, 0.0]))

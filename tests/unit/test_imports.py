@@ -67,8 +67,8 @@ ALLOWED = {
 FLOORS = {
     "filters": ["base", "algebra", "frame", "covariance", "steps", "kinds", "sigma", "bank", "order", "choice",
                 "build"],
-    "filters.covariance": ["names", "noise", "kept", "parts", "base", "motion", "kernels", "gather", "loops",
-                           "straight", "forms", "ud", "full", "sqrt"],
+    "filters.covariance": ["names", "noise", "kept", "parts", "base", "motion", "definite", "kernels", "gather",
+                           "loops", "straight", "forms", "ud", "full", "sqrt"],
     "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "build"],
 }  # fmt: skip
 """Part or room -> its files and rooms, the lowest first: each imports only what stands before it."""

@@ -91,9 +91,10 @@ def gram_schmidt(rows: Rows, weights: Vector) -> tuple[Rows, Vector]:
 
 
 def cholesky(P: Callable[[int, int], Value], n: int, tolerance: Fraction) -> tuple[Rows, list[Value]]:
-    """The lower root S of P (n, n) with S S^T = P, and conditions under which P is indefinite beyond rounding.
+    """The lower root S of P (n, n) with S S^T = P, and conditions under which a variance is negative.
 
-    A pivot up to `tolerance` of its diagonal is a direction without spread: a zero column.
+    A pivot up to `tolerance` of its diagonal is a direction without spread: a zero column; so is one that is negative,
+    which round-off may make by any amount where a variance is small beside what it has been.
     """
     S: Rows = [[0] * n for _ in range(n)]
     failures: list[Value] = []
@@ -103,7 +104,7 @@ def cholesky(P: Callable[[int, int], Value], n: int, tolerance: Fraction) -> tup
         if is_zero(pivot):
             continue
         limit = diagonal * tolerance
-        failures.append(~(pivot >= -limit))
+        failures.append(~(diagonal >= 0))
         some = pivot > limit
         root = sqrt(select(some, pivot, 0))
         S[j][j] = assume_nonnegative(root)

@@ -15,7 +15,7 @@ from kfgen.filters.algebra.numbers import Number
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.parts import Columns, Gain, Gatherer, Gathering, Mixer, Motion, Scalar
+from kfgen.filters.covariance.parts import Columns, Gain, Gatherer, Gathering, Mixer, Motion, Removal, Scalar
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 
@@ -129,14 +129,20 @@ class Form(Protocol[P]):
         """What takes deviations in, from Q and the columns (w, d) of noise that is not additive on."""
         ...
 
-    def downdated(
-        self, t: Trace, P: P, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: P
-    ) -> tuple[P, Value]:
-        """P - c c^T / s, s > 0, and the condition under which that is indefinite beyond `tolerance`, relative.
+    def downdated(self, t: Trace, P: P, c: Vector, s: Number, how: Removal, prior: P) -> tuple[P, Value]:
+        """P - c c^T / s, s > 0, and the condition under which that is indefinite beyond round-off.
 
-        sure: it cannot be, but for rounding that leaves variances positive. prior: P before all of an update, to
-        which round-off is relative.
+        prior: P before all of an update, to which round-off is relative.
         """
+        ...
+
+    def bounded(self, t: Trace, P: P, prior: P, share: Value, tolerance: Fraction) -> tuple[P, Value]:
+        """P after a whole vector, of which P_jj >= share prior_jj is known, and whether it may be round-off: where the
+        share is below `tolerance`. limit_correlations is then called when P has been stored."""
+        ...
+
+    def limit_correlations(self, t: Trace) -> None:
+        """Of the P that has been stored: |P_ij| <= sqrt(P_ii P_jj)."""
         ...
 
     def indefinite(self, P: P, tolerance: Fraction) -> tuple[P, list[Value]]:

@@ -139,6 +139,16 @@ class Gathering:
     checked: bool
 
 
+@dataclass(frozen=True)
+class Removal:
+    """How a column is taken away. tolerance: what is negative within it, relative, is round-off. sure: what is left is
+    positive, but for rounding that leaves variances so. definite: it is nonnegative, but for any rounding."""
+
+    tolerance: Fraction
+    sure: bool
+    definite: bool
+
+
 class Part(Protocol):
     """An estimate in the struct that takes part in a mixture."""
 

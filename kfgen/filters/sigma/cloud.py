@@ -17,6 +17,7 @@ from kfgen.filters.algebra.numbers import is_zero, select
 from kfgen.filters.base import CONST_KF, INPUTS
 from kfgen.filters.sigma.points import PointSet
 from kfgen.filters.steps import process
+from kfgen.geometry.part import Part
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Argument, Call, Function, Statement, roots, walk
 from kfgen.ir.schedule import schedule
@@ -132,11 +133,14 @@ def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], tak
     return private(f"h_{sensor.name}", body, [point, out], f"what {sensor.name} measures at x")
 
 
-def fill(t: Trace, cloud: Array, points: PointSet, columns: list[Vector]) -> None:
-    """Write what each point adds to the mean: rows of coefficients times the columns of the root, each (stride,)."""
+def fill(t: Trace, cloud: Array, points: PointSet, columns: list[Vector], step: int = 1) -> None:
+    """Write what each point adds to the mean: rows of coefficients times the columns of the root, each (stride,).
+
+    step: of each so many points only the first.
+    """
     stride = len(columns[0])
     scaled: dict[tuple[int, Fraction], list[Value]] = {}
-    for k, row in enumerate(points.rows):
+    for k, row in list(enumerate(points.rows))[::step]:
         for i in range(stride):
             total: Value | int = 0
             for j, coefficient in enumerate(row):
@@ -161,8 +165,10 @@ def residual_uses(model: Model, sensor: SensorModel) -> set[str]:
     return model.uses(*(r for r in sensor.residual if r is not None))
 
 
-def difference(t: Trace, model: Model, sensor: SensorModel, i: int, z: Value, base: Value, x: list[Value]) -> Value:
-    """z - base of component i, wrapped, or by its own residual at x."""
+def difference(
+    t: Trace, model: Model, sensor: SensorModel, part: Part, i: int, z: Value, base: Value, x: list[Value]
+) -> Value:
+    """z - base of component i in the geometry of its images, or by its own residual at x."""
     used = residual_uses(model, sensor)
     residual = sensor.residual[i]
     if residual is not None:
@@ -171,7 +177,7 @@ def difference(t: Trace, model: Model, sensor: SensorModel, i: int, z: Value, ba
         evaluator.bind(sympy.Symbol(f"z_{name}"), z)
         evaluator.bind(sympy.Symbol(f"h_{name}"), base)
         return evaluator.value(residual)
-    difference: Value = sensor.parts[i].local(z, base)
+    difference: Value = part.local(z, base)
     return difference
 
 
@@ -191,21 +197,32 @@ def depends(value: Value, prefixes: tuple[str, ...]) -> bool:
 
 def bends(values: list[Value], gradients: list[Value]) -> bool:
     """Whether some function of kf.x is not affine: a derivative depends on it, or something jumps with it."""
-    if any(depends(g, ("kf.x",)) for g in gradients):
-        return True
+    return any(depends(g, ("kf.x",)) for g in gradients) or _jumps(values, _STEPS, ("kf.x",))
+
+
+def passes(image: Dual, periodic: list[str]) -> bool:
+    """Whether a function of kf.x and noises `w.` is linear in the periodic states and jumps nowhere."""
+    slopes = [image.gradient[name] for name in periodic if name in image.gradient]
+    varying = ("kf.x", "w.")
+    return not any(depends(g, varying) for g in slopes) and not _jumps([image.value], (*_STEPS, *_TURNS), varying)
+
+
+def _jumps(values: list[Value], steps: tuple[str, ...], varying: tuple[str, ...]) -> bool:
+    """Whether an operation that steps depends on what varies."""
     stack, seen = [v.node for v in values], set()
     while stack:
         node = stack.pop()
         if node.serial in seen:
             continue
         seen.add(node.serial)
-        if node.op in _JUMPS and depends(Value(values[0].trace, node), ("kf.x",)):
+        if node.op in steps and depends(Value(values[0].trace, node), varying):
             return True
         stack.extend(node.args)
     return False
 
 
-_JUMPS = ("lt", "le", "sign", "floor", "ceil", "segment", "wrap")
+_STEPS = ("lt", "le", "sign", "floor", "ceil", "segment", "wrap")
+_TURNS = ("atan", "atan2")
 
 
 def carried_by(model: Model, duals: list[Dual], names: list[str], covariance: tuple[tuple[object, ...], ...],

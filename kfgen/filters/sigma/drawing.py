@@ -36,6 +36,11 @@ class Drawing:
         """Write points of P (n, n) and of carried noises, of which `noise` (q, q) is a root, into the array;
         conditions of failure. stored: P is that of the struct."""
         root = self.form.root(t, P, self.tolerance, stored, self.in_loops)
+        return self._written(t, root, noise, points, array)
+
+    def _written(
+        self, t: Trace, root: Array | Columns, noise: Rows, points: PointSet, array: Array
+    ) -> list[Value]:
         if isinstance(root, Columns):
             fill(t, array, points, self._columns(t, root, noise))
             return root.failures
@@ -44,6 +49,28 @@ class Drawing:
         else:
             _combine(t, array, points, root, self.form.n)
         return []
+
+    def around(
+        self, t: Trace, P: Any, noise: Rows, points: PointSet, array: Array, x: list[Value]
+    ) -> list[Value]:
+        """Write points about x (n,), of the P of the struct; conditions of failure."""
+        n, stride = self.form.n, self.form.n + len(noise)
+        root = self.form.root(t, P, self.tolerance, True, self.in_loops)
+        middle = [*x, *[t.zero] * len(noise)]
+        if isinstance(root, Columns) and points.symmetric:
+            fill(t, array, points, self._columns(t, root, noise), step=2)
+            with t.loop("j", 0, len(points.rows) // 2) as j:
+                at = 2 * j * stride
+                for i, value in enumerate(middle):
+                    part = t.name(array[at + i], f"part_{i}")
+                    array[at + i] = value + part
+                    array[at + (stride + i)] = value - part
+            return root.failures
+        failures = self._written(t, root, noise, points, array)
+        with t.loop("j", 0, len(points.rows)) as j:
+            for i in range(n):
+                array[j * stride + i] = array[j * stride + i] + x[i]
+        return failures
 
     def _columns(self, t: Trace, root: Columns, noise: Rows) -> list[Vector]:
         """Columns (n + q) of a root of P, in the spec's order, and of the noises'."""

@@ -1,12 +1,12 @@
 """Sigma points as a filter needs them: weights, and how a covariance is gathered from deviations.
 
-With d_k = X_k - X_0, X_0 the image of the centre, and delta = sum wm_k d_k the shift of the mean from it,
+With e_k = X_k - X_0, X_0 the image of the centre, and d = sum wm_k e_k the shift of the mean from it,
 
-    sum wc_k (X_k - mean)(..)^T = sum wc (d_k - theta delta)(..)^T + extra delta delta^T
+    sum wc_k (X_k - mean)(..)^T = sum wc (e_k - theta d)(..)^T + extra d d^T, k >= 1
 
-for equal weights of all points but the centre; theta is 0 or 1, and `extra` then a constant. The one for which
-it is not negative is taken: nothing is then ever subtracted, however small alpha is. With theta = 0,
-extra = W - 2 wc / wm, W the sum of all wc: beta - alpha^2 for merwe.
+for equal weights of all points but the centre. Of merwe and wiki theta is 0 and extra beta - alpha^2: weights of
+-1/alpha^2 cancel out, and nothing is subtracted where beta >= alpha^2. Of the others theta is 1 and extra the centre's
+own weight.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def point_set(options: Points, L: int) -> PointSet:
         for sign in (1, -1):
             rows.append([sign * reach if i == j else Fraction(0) for i in range(L)])
     count = 2 * L
-    shifted = wc0 + count * wc - 2 * wc / wm
-    theta, extra = (0, shifted) if shifted >= 0 else (1, wc0)
+    scaled = options.kind in ("merwe", "wiki")
+    theta, extra = (0, options.beta - options.alpha**2) if scaled else (1, wc0)
     return PointSet(rows, [wm] * count, [wc] * count, options.kind != "cubature", wc0, theta, extra, True, True)
 
 

@@ -14,6 +14,7 @@ from kfgen.filters.covariance.parts import Gatherer, Gathering
 from kfgen.filters.frame import guards
 from kfgen.filters.kinds.single import SingleFilter
 from kfgen.filters.sigma import cloud
+from kfgen.filters.sigma.carried import images_of_process
 from kfgen.filters.sigma.cloud import Private
 from kfgen.filters.sigma.drawing import Drawing, noise_root
 from kfgen.filters.sigma.points import PointSet
@@ -43,6 +44,7 @@ class Propagation:
         self.f = f
         self.absorb = absorb
         self.n = len(model.states)
+        self.parts = images_of_process(model)
 
     def predicting(self, filter_: SingleFilter, t: Trace, step: Step) -> Phases:
         """The step from the estimate in the struct. filter_: it limits and stores what comes out."""
@@ -54,8 +56,8 @@ class Propagation:
         noise, tested = self._noise_root(t, prior.duals)
         stride = self.n + len(self.carried)
         array = t.array("points", len(self.points.rows) * stride)
-        failures = self.drawing.scatter(t, P0, noise, self.points, array)
-        x, P, failed, shift = self._propagated(t, array, stride, prior.x, result, step)
+        failures = self.drawing.around(t, P0, noise, self.points, array, prior.x)
+        x, P, failed, shift = self._propagated(t, array, stride, prior.x, result, step, bool(filter_.outdated))
         failures += failed
         for value, name in zip(x, model.states, strict=True):
             t.name(value, f"{name}_next")
@@ -83,12 +85,13 @@ class Propagation:
         return noise_root(C, self.model.spec.filter.covariance, self.drawing.tolerance)
 
     def _propagated(
-        self, t: Trace, array: Array, stride: int, x: list[Value], result: process.Advance, step: Step
+        self, t: Trace, array: Array, stride: int, x: list[Value], result: process.Advance, step: Step, keep: bool
     ) -> tuple[list[Value], Any, list[Value], list[Value]]:
-        """The mean, the covariance, conditions of failure, and the mean's shift from the centre's image."""
+        """The mean, the covariance, conditions of failure, and the mean's shift from the centre's image. keep: the
+        array is to hold the deviations."""
         model, n, points, f = self.model, self.n, self.points, self.f
         count = len(points.rows)
-        if points.centre or not all(part.flat for part in model.parts):
+        if points.centre or not all(part.flat for part in self.parts):
             base_array = t.array("centre", stride)
             for i in range(stride):
                 base_array[i] = x[i] if i < n else t.zero
@@ -106,21 +109,20 @@ class Propagation:
         how = Gathering(names, common, self.scalar.epsilon, in_loops, self.absorb, checked=not points.positive)
         gather = self.form.gatherer(t, Q, noise, how)
         self.rewritten = gather.rewrites and points.theta != 0
-        t.section("points through f; deviations overwrite them")
+        t.section("points through f, and their deviations")
         with t.loop("k", 0, count) as k:
             at = k * stride
-            for i in range(n):
-                array[at + i] = array[at + i] + x[i]
             t.call(f.function, [*f.arguments(step.dt), ("points", at)])
             rejected = self._rejected(t, array, at, step)
             deviations = []
-            for i, part in enumerate(model.parts):
+            for i, part in enumerate(self.parts):
                 d = part.local(cloud.clipped(t, array[at + i], model.bounds[i]), base[i])
                 if rejected is not None:
                     d = t.select(rejected, t.zero, d)
                 deviations.append(t.name(d, f"dev_{model.states[i]}"))
-            for i, d in enumerate(deviations):
-                array[at + i] = d
+            if gather.rewrites or points.theta or keep:
+                for i, d in enumerate(deviations):
+                    array[at + i] = d
             weight = cloud.weights(t, points.wm, k, "wm")
             for variable, d in zip(sums, deviations, strict=True):
                 variable.set(variable.get() + (d if points.uniform else weight * d))

@@ -15,6 +15,7 @@ from kfgen.filters.covariance.noise import Given
 from kfgen.filters.frame import guards
 from kfgen.filters.kinds.ekf import Update
 from kfgen.filters.sigma import cloud
+from kfgen.filters.sigma.carried import images_of_sensor
 from kfgen.filters.sigma.cloud import Private
 from kfgen.filters.sigma.drawing import Drawing, noise_root
 from kfgen.filters.sigma.points import PointSet
@@ -57,6 +58,7 @@ class Seeing:
         self.tolerance = drawing.tolerance
         self.n, self.m, self.q = len(model.states), len(sensor.h), len(carried)
         self.stride = self.n + self.q
+        self.parts = images_of_sensor(model, sensor)
         self.symmetric = not recalls and points.balanced
         self.linear = self._is_linear()
         self.h: Private | None = None
@@ -68,7 +70,7 @@ class Seeing:
             return False
         if any(b is not None for b in model.bounds):
             return False
-        if not all(part.flat for part in sensor.parts) or any(r is not None for r in sensor.residual):
+        if not all(part.flat for part in self.parts) or any(r is not None for r in sensor.residual):
             return False
         t = Trace()
         code = SensorCode(t, model, sensor, list(range(self.n)))
@@ -106,7 +108,9 @@ class Seeing:
         point, z = t.array("point", self.stride), t.array("z", m)
         store = None if points.theta == 0 else t.array("dz", len(points.rows) * m)
         call = self.h.arguments(None)
-        middle = [t.element("middle", i) if self.recalls and points.centre else t.zero for i in range(n)]
+        middle = [t.zero] * n
+        if self.recalls and points.centre:
+            middle = [t.name(t.element("middle", i), f"{name}_middle") for i, name in enumerate(model.states)]
         for i in range(self.stride):
             point[i] = (x[i] + middle[i] if i < n else t.zero)
         t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
@@ -116,7 +120,9 @@ class Seeing:
         spread = {(a, b): t.variable(f"s_{names[a]}_{names[b]}", 0) for b in range(m) for a in range(b + 1)}
         labels = [*model.states, *self.carried]
         cross = {(i, a): t.variable(f"c_{labels[i]}_{names[a]}", 0) for i in range(self.stride) for a in range(m)}
-        first = [t.variable(f"m_{label}", 0) for label in labels] if not self.symmetric else []
+        about = not self.symmetric and points.theta != 0
+        first = [t.variable(f"m_{label}", 0) for label in labels] if about else []
+        around = self.recalls and points.centre and not about  # the centre's image: the mean's shift is in `middle`
         t.section("points through h")
         with t.loop("k", 0, len(points.rows)) as k:
             at = k * self.stride
@@ -124,8 +130,11 @@ class Seeing:
                 own = t.element("cloud", at + i)
                 point[i] = x[i] + own if i < n else own
             t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
-            d = [t.name(cloud.difference(t, model, sensor, a, z[a], base[a], x), f"dz_{names[a]}") for a in range(m)]
+            apart = [cloud.difference(t, model, sensor, part, a, z[a], base[a], x) for a, part in enumerate(self.parts)]
+            d = [t.name(v, f"dz_{name}") for v, name in zip(apart, names, strict=True)]
             part = [t.element("cloud", at + i) for i in range(self.stride)]
+            if around:
+                part = [own - shifted for own, shifted in zip(part, middle, strict=True)]
             wm, wc = cloud.weights(t, points.wm, k, "wm"), cloud.weights(t, points.wc, k, "wc")
             weighted = d if points.uniform else [v * wc for v in d]
             for a in range(m):
@@ -159,6 +168,8 @@ class Seeing:
             if first:  # the weighted sum of deviations of x need not be 0
                 whole = first[i].get() * scale_c + (middle[i] if i < n else t.zero) * points.wc0
                 value = value - whole * delta[a]
+            elif around:
+                value = value - middle[i] * delta[a] * points.extra
             t.store("seen", offset + i * m + a, value)
         sizes = [("x", n, True), *([("middle", n, True)] if self.recalls and points.centre else []),
                  ("cloud", len(points.rows) * self.stride, True), ("seen", self.size, False)]  # fmt: skip

@@ -17,7 +17,7 @@ from kfgen.filters.covariance.kernels.function import Kernels
 from kfgen.filters.covariance.kernels.updates import absorb_one
 from kfgen.filters.kinds.ekf import Ekf, Learnt, Update
 from kfgen.filters.sigma import cloud
-from kfgen.filters.sigma.carried import by_process, by_sensor
+from kfgen.filters.sigma.carried import by_process, by_sensor, images_of_process
 from kfgen.filters.sigma.drawing import FROM, Drawing
 from kfgen.filters.sigma.points import point_set
 from kfgen.filters.sigma.propagation import Propagation
@@ -66,7 +66,9 @@ class Ukf(Ekf):
         """Whether f is linear, so that F P F^T is what points would give."""
         model = self.model
         plain = not self.keeps and not self.carried and self.set.exact and not model.options.rejects
-        if not plain or not all(part.flat for part in model.parts) or any(b is not None for b in model.bounds):
+        if not plain or any(b is not None for b in model.bounds):
+            return False
+        if not all(part.flat for part in images_of_process(model)):
             return False
         t = Trace()
         step = process.step_length(t, model)

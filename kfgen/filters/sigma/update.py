@@ -7,14 +7,11 @@ component by component as in an ekf.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.linalg import Rows, Vector, times
 from kfgen.filters.algebra.numbers import (
-    Number,
     assume_nonnegative,
     assume_positive,
     is_positive,
@@ -26,8 +23,10 @@ from kfgen.filters.algebra.numbers import (
 )  # fmt: skip
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.motion import Moved
+from kfgen.filters.covariance.parts import Removal
 from kfgen.filters.frame import guards
 from kfgen.filters.kinds.ekf import Ekf, Update
+from kfgen.filters.sigma.innovation import Factored, Trust, factored, known_squares, pivots
 from kfgen.filters.sigma.seeing import Seeing, Seen
 from kfgen.filters.steps.gate import chi2_threshold
 from kfgen.filters.steps.phases import Judged, Made, Phases
@@ -35,58 +34,6 @@ from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated, mas
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model.model import SensorModel
 from kfgen.quantiles import log_two_pi
-
-
-@dataclass(frozen=True)
-class Factored:
-    """S = L D L^T and what belongs to it: nu = L^-1 y, the columns of Pxz L^-T (m, n), 1 / D or 0, D or 1."""
-
-    nu: Vector
-    columns: list[Vector]
-    inverse: Vector
-    D: Vector
-    some: list[Value | None]  # whether D counts; None: it does
-    failures: list[Value]
-    nis: Value
-
-
-def factored(
-    t: Trace, names: list[str], y: Vector, S: Rows, cross: Rows, sure: bool, tolerance: Fraction, noise: Vector
-) -> Factored:
-    """sure: every pivot is known to be positive, but for what a guard finds. noise: what rounding may leave of each
-    variance (m,)."""
-    m, n = len(y), len(cross)
-    rest = [list(row) for row in S]
-    nu = list(y)
-    columns: list[Vector] = [[cross[i][a] for i in range(n)] for a in range(m)]
-    D: Vector = []
-    inverse: Vector = []
-    some: list[Value | None] = []
-    failures: list[Value] = []
-    nis: Value = t.zero
-    for j in range(m):
-        pivot = t.name(rest[j][j], f"s_{names[j]}")
-        counts: Value | None = None
-        if sure:
-            failures.append(~(pivot > 0))
-            inverse.append(1 / assume_positive(pivot))
-            D.append(pivot)
-        else:
-            limit = S[j][j] * (tolerance * m) + noise[j]
-            failures.append(~(pivot >= -limit))
-            counts = (pivot > limit) & (pivot > 0)
-            inverse.append(select(counts, 1 / pivot, 0))
-            D.append(assume_positive(select(counts, pivot, 1)))
-            columns[j] = [select(counts, c, 0) for c in columns[j]]
-        some.append(counts)
-        for i in range(j + 1, m):
-            factor = rest[j][i] * inverse[j]
-            for k in range(i, m):
-                rest[i][k] = rest[i][k] - factor * rest[j][k]
-            nu[i] = nu[i] - factor * nu[j]
-            columns[i] = [linalg.minus(c, times(factor, b)) for c, b in zip(columns[i], columns[j], strict=True)]
-        nis = nis + nu[j] * (nu[j] * inverse[j])
-    return Factored(nu, columns, inverse, D, some, failures, nis)
 
 
 def whole_vector(
@@ -110,7 +57,7 @@ def whole_vector(
     first = work.factored(seen, made=model.options.inflation is None)
     nis = t.name(first.nis, "nis")
     t.section("guards")
-    sound = [*work.y(seen), *first.D, *u.tested, *(v for row in work.R for v in row)]
+    sound = [*work.y(seen), *first.pivots, *u.tested, *(v for row in work.R for v in row)]
     guards.finite(t, [*sound, nis] if sensor.gate is None else sound)
     guards.doubts(t, [v for row in work.R for v in row])
     guards.positive(t, [*failures, *first.failures])
@@ -122,12 +69,12 @@ def whole_vector(
     t.section("gain and covariance")
     prior = P
     failed: list[Value] = [] if final is first else list(final.failures)
-    sure = work.sure
+    how = Removal(seeing.tolerance, work.sure, work.definite)
     motion = Moved(t, ukf.order, [0] * seeing.n)
     likelihood: Value = t.zero
     for j in range(seeing.m):
         c = [final.columns[j][place] for place in ukf.order]
-        P, bad = form.downdated(t, P, c, final.D[j], seeing.tolerance, sure, prior)
+        P, bad = form.downdated(t, P, c, final.D[j], how, prior)
         if not work.definite:  # else it can only be round-off, and has been taken for zero
             failed.append(bad)
         step = final.nu[j] * final.inverse[j]
@@ -137,6 +84,9 @@ def whole_vector(
         if used is not None:
             counts = used[j] if counts is None else counts & used[j]
         likelihood = likelihood + (term if counts is None else t.select(counts, term, 0))
+    doubtful: Value | None = None
+    if work.definite:
+        P, doubtful = form.bounded(t, P, prior, final.share, seeing.tolerance)
     t.section("state")
     x = ukf.moved(u, motion)
     evidence = ukf.unconfined(x) + form.evidence(P, after_predict=final is not first)
@@ -152,6 +102,9 @@ def whole_vector(
     learnt = ukf.prepared(u, x, P, motion)
     yield Made(x, P, nis, log_likelihood)
     ukf.store_update(u, x, P, learnt)
+    if doubtful is not None and doubtful.constant != 0:
+        with t.when(doubtful):
+            form.limit_correlations(t)
 
 
 class _Whole:
@@ -161,7 +114,7 @@ class _Whole:
         self.ukf = ukf
         self.u = u
         self.seeing = seeing
-        self.H = linear.H
+        self.linear = linear
         m = seeing.m
         R: Rows = linear.R
         if u.adapted is not None:
@@ -175,6 +128,7 @@ class _Whole:
                 ukf.suppose(d)
         diagonal = all(is_zero(self.R[i][j]) for i in range(m) for j in range(m) if i != j)
         self.definite = seeing.points.positive and seeing.points.exact
+        self.exact = any(is_zero(r) for r in pivots(self.R, 8 * m * ukf.scalar.epsilon))  # without noise
         self.sure = diagonal and all(is_positive(self.R[i][i]) for i in range(m)) and self.definite
 
     def y(self, seen: Seen) -> Vector:
@@ -208,20 +162,25 @@ class _Whole:
                 S[i][i] = select(low, t.value(floor), S[i][i])
         names = [c.name for c in self.seeing.sensor.spec.components]
         epsilon = self.ukf.scalar.epsilon
-        # points differ from each other by the rounding of what h is made of, if by nothing else
-        total = sum(abs(w) for w in self.seeing.points.wc) * (32 * epsilon) ** 2
-        noise: Vector = [0 if self.sure else z * z * total for z in seen.z]
-        if self.seeing.linear and not self.sure:
-            noise = [self._left(h) for h in self.H]
-        return factored(t, names, self.y(seen), S, cross, self.sure, 8 * epsilon, noise)
+        noise = [t.value(0) if self.sure else self._rounding(a, seen) for a in range(m)]
+        trust = Trust(self.sure, self.definite, 8 * epsilon, noise)
+        return factored(t, names, self.y(seen), S, R, cross, trust)
 
-    def _left(self, h: Vector) -> Number:
-        """What rounding may leave of h P h^T where h x is known exactly."""
-        places = [i for i, a in enumerate(h) if not is_zero(a)]
-        if len(places) < 2:
-            return 0
-        P, n = self.ukf.form.entries(self.u.P), self.seeing.n
-        return sum(P[i, i] * (h[i] * h[i]) for i in places) * (8 * n * self.ukf.scalar.epsilon)
+    def _rounding(self, a: int, seen: Seen) -> Value:
+        """What the variance of component a may be by round-off where it is 0."""
+        u, points, epsilon = self.u, self.seeing.points, self.ukf.scalar.epsilon
+        h = self.linear.H[a]
+        if self.seeing.linear:
+            dense = u.form.entries(u.P)
+            terms = [dense[i, i] * (slope * slope) for i, slope in enumerate(h) if not is_zero(slope)]
+            return u.t.value(sum(terms) * (8 * self.seeing.n * epsilon))
+        # points differ from each other by the rounding of what h adds up, if by nothing else
+        size: Value = seen.z[a] if not self.exact else u.t.function("abs", seen.z[a])
+        if self.exact:
+            for place, slope in zip(self.ukf.order, h, strict=True):
+                if not is_zero(slope):
+                    size = size + u.t.function("abs", u.x[place] * slope)
+        return size * size * (sum(abs(w) for w in points.wc) * (32 * epsilon) ** 2)
 
     def inflated(
         self, seen: Seen, first: Factored, array: Array | None, out: Array | None
@@ -234,7 +193,7 @@ class _Whole:
         threshold = inflation.threshold
         limit = chi2_threshold(t, inflation.probability, seeing.m, u.used) if threshold is None else t.value(threshold)
         known = Fraction(1, 10**12) if self.ukf.scalar.name == "double" else Fraction(1, 10**6)
-        terms = _known_squares(t, self.y(seen), self.spread(seen), first.D, first.some, known)
+        terms = known_squares(t, self.y(seen), self.spread(seen), first.D, first.some, known)
         fails = t.name(first.nis > limit, "anomaly")
         t.flag(fails, "ANOMALY")
         a = terms * (1 / limit - reciprocal(assume_nonnegative(first.nis))[1])
@@ -254,25 +213,3 @@ class _Whole:
                     array[k * seeing.stride + i] = array[k * seeing.stride + i] * root
             seeing.run(u, out, array)
         return P, self.factored(seeing.read(t, out))
-
-
-def _known_squares(t: Trace, y: Vector, S: Rows, D: Vector, some: list[Value | None], known: Fraction) -> Value:
-    """y^T S^-1 y over the pivots of S that are above `known` of the entries of D."""
-    m = len(y)
-    rest = [list(row) for row in S]
-    nu = list(y)
-    total: Value = t.zero
-    for j in range(m):
-        pivot = rest[j][j]
-        counts = pivot > D[j] * known
-        choice = some[j]
-        if choice is not None:
-            counts = counts & choice
-        inverse = select(counts, 1 / pivot, 0)
-        for i in range(j + 1, m):
-            factor = rest[j][i] * inverse
-            for k in range(i, m):
-                rest[i][k] = rest[i][k] - factor * rest[j][k]
-            nu[i] = nu[i] - factor * nu[j]
-        total = total + nu[j] * (nu[j] * inverse)
-    return total

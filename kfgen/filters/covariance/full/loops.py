@@ -21,7 +21,7 @@ from kfgen.filters.covariance.loops.looped import Looped, Looping
 from kfgen.filters.covariance.loops.motion import ArrayGain, Displacement
 from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.parts import Gathering, Part, Scalar
+from kfgen.filters.covariance.parts import Gathering, Part, Removal, Scalar
 from kfgen.filters.frame.runs import put
 from kfgen.ir.trace import Array, Trace, Value
 
@@ -34,7 +34,7 @@ class LoopedFull(Looped, FullStore):
 
     def __init__(self, sibling: StraightFull, how: Looping) -> None:
         Looped.__init__(self, sibling, how)
-        FullStore.__init__(self, sibling.n)
+        FullStore.__init__(self, sibling.n, how.kernels)
         self.epsilon = sibling.epsilon
         self.form = sibling.form
         self.updates = Updates(how.kernels, sibling.form, sibling.change, sibling.epsilon, how.steps)
@@ -114,7 +114,7 @@ class LoopedFull(Looped, FullStore):
         return LoopedEntries(t, self.kernels, Q, noise, how)
 
     def downdated(
-        self, t: Trace, P: ArrayEntries, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: ArrayEntries
+        self, t: Trace, P: ArrayEntries, c: Vector, s: Number, how: Removal, prior: ArrayEntries
     ) -> tuple[ArrayEntries, Value]:
         """One more term; what rounding has left of a variance below zero is taken for zero."""
         if len(P.terms) == PENDING:
@@ -124,7 +124,7 @@ class LoopedFull(Looped, FullStore):
         fill(t, array, c)
         weight = t.name(t.value(1 / s), "weight")
         P = replace(P, terms=(*P.terms, Term(array, weight)))
-        if sure:
+        if how.definite:
             return P, t.wrapped(t.pool.boolean(False))
         P = P.written()
         own, worst = Array(t, P.array), t.variable(t.unique("worst"), 0)
@@ -133,11 +133,29 @@ class LoopedFull(Looped, FullStore):
             variance = t.name(own[place], "variance")
             before = variance + array[i] * array[i] * weight
             # the points' rounding is in c
-            worst.set(select(variance < -(before * (1024 * tolerance)), 1, worst.get()))
+            worst.set(select(variance < -(before * (1024 * how.tolerance)), 1, worst.get()))
             low = t.name(variance < 0, "negative")
             t.flag(low, "REGULARIZED")
             own[place] = select(low, 0, variance)
         return P, worst.get() > 0
+
+    def bounded(
+        self, t: Trace, P: ArrayEntries, prior: ArrayEntries, share: Value, tolerance: Fraction
+    ) -> tuple[ArrayEntries, Value]:
+        doubtful = t.name(share < tolerance, "doubtful")
+        before = P.space.array("before", self.n)
+        with t.when(doubtful), t.loop("i", 0, self.n) as i:
+            before[i] = prior.at(i, i)
+        P = P.written()
+        own = Array(t, P.array)
+        with t.when(doubtful), t.loop("i", 0, self.n) as i:
+            place = upper_start(i) + i
+            variance, least = t.name(own[place], "variance"), t.name(before[i] * share, "least")
+            t.flag(variance < 0, "REGULARIZED")
+            # without noise what is left is nothing but rounding
+            low = t.name(variance < select(share > 0, least, before[i] * tolerance), "low")
+            own[place] = select(low, least, variance)
+        return P, doubtful
 
     def indefinite(self, P: ArrayEntries, tolerance: Fraction) -> tuple[ArrayEntries, list[Value]]:
         P = P.written()

@@ -8,6 +8,8 @@ from fractions import Fraction
 from kfgen.filters.algebra.numbers import select, sqrt
 from kfgen.filters.algebra.triangles import upper_size, upper_start
 from kfgen.filters.base import Block
+from kfgen.filters.covariance.kernels.correlations import limit
+from kfgen.filters.covariance.kernels.function import Kernels
 from kfgen.filters.covariance.names import entries
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
@@ -20,9 +22,19 @@ class FullStore:
     reorders = False
     factored = False
 
-    def __init__(self, n: int) -> None:
+    def __init__(self, n: int, kernels: Kernels | None = None) -> None:
         self.n = n
         self.order = list(range(n))
+        self.shared = kernels
+
+    def limit_correlations(self, t: Trace) -> None:
+        """Of the P that has been stored."""
+        t.call(limit(self._kernels(t), self.n), [("kf.P", 0)])
+
+    def _kernels(self, t: Trace) -> Kernels:
+        if self.shared is None:
+            self.shared = Kernels(Fraction(t.smallest), frozenset())
+        return self.shared
 
     def blocks(self, P0: list[list[Fraction]], names: Sequence[str]) -> list[Block]:
         flat = tuple(P0[i][j] for j in range(self.n) for i in range(j + 1))
@@ -44,7 +56,7 @@ class FullStore:
     def root_array(self, t: Trace, tolerance: Fraction, own: Array | None = None) -> Array:
         """The columns of the lower root of P, one after another. own: an array in place of the field.
 
-        A pivot up to `tolerance` of its diagonal is a direction without spread.
+        A pivot up to `tolerance` of its diagonal, or below 0, is a direction without spread.
         """
         n = self.n
 
@@ -58,10 +70,10 @@ class FullStore:
             with t.loop("k", 0, j) as k:
                 pivot.set(pivot.get() - out[k * n + j] * out[k * n + j])
             left = t.name(pivot.get(), "left")
-            limit = t.name(diagonal * tolerance, "limit")
-            t.guard(~(left >= -limit), "NOT_POSITIVE")
-            length = t.name(sqrt(select(left > limit, left, 0)), "length")
-            inverse = t.name(select(left > limit, 1 / length, 0), "inverse")
+            least = t.name(diagonal * tolerance, "least")
+            t.guard(~(diagonal >= 0), "NOT_POSITIVE")
+            length = t.name(sqrt(select(left > least, left, 0)), "length")
+            inverse = t.name(select(left > least, 1 / length, 0), "inverse")
             out[j * n + j] = length
             with t.loop("i", j + 1, n) as i:
                 rest = t.variable("rest", entry(upper_start(i) + j))

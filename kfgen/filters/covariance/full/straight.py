@@ -16,7 +16,7 @@ from kfgen.filters.covariance.loops.partly import EntriesInLoops
 from kfgen.filters.covariance.motion import VectorGain
 from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Scalar
+from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Removal, Scalar
 from kfgen.filters.covariance.straight import StraightLine
 from kfgen.ir.trace import Array, Trace, Value
 
@@ -163,22 +163,42 @@ class StraightFull(StraightLine, FullStore):
         return EntriesInLoops(t, Q, noise, how) if how.in_loops else GatheredEntries(t, Q, noise, how)
 
     def downdated(
-        self, t: Trace, P: Symmetric, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Symmetric
+        self, t: Trace, P: Symmetric, c: Vector, s: Number, how: Removal, prior: Symmetric
     ) -> tuple[Symmetric, Value]:
         inverse = 1 / s
         K = [times(x, inverse) for x in c]
         after = P.changed(lambda i, j, p: minus(p, times(K[i], c[j])))
-        if sure:
-            return after, t.wrapped(t.pool.boolean(False))
-        low = {i: after[i, i] < 0 for i in range(self.n) if not is_zero(c[i])}
         failed: Value = t.wrapped(t.pool.boolean(False))
+        if how.definite:
+            return after, failed
+        low = {i: after[i, i] < 0 for i in range(self.n) if not is_zero(c[i])}
         for i, negative in low.items():
-            failed = failed | (after[i, i] < -(P[i, i] * (1024 * tolerance)))  # the points' rounding is in c
+            failed = failed | (after[i, i] < -(P[i, i] * (1024 * how.tolerance)))  # the points' rounding is in c
             t.flag(negative, "REGULARIZED")
         return after.changed(lambda i, j, p: select(low[i], 0, p) if i == j and i in low else p), failed
 
+    def bounded(
+        self, t: Trace, P: Symmetric, prior: Symmetric, share: Value, tolerance: Fraction
+    ) -> tuple[Symmetric, Value]:
+        doubtful = t.name(share < tolerance, "doubtful")
+        changed = [i for i in range(self.n) if not _same(P[i, i], prior[i, i])]
+        variances = {i: t.variable(t.unique(f"variance_{i}"), P[i, i]) for i in changed}
+        with t.when(doubtful):
+            for i, variance in variances.items():
+                value, least = variance.get(), prior[i, i] * share
+                t.flag(value < 0, "REGULARIZED")
+                # without noise what is left is nothing but rounding
+                low = value < select(share > 0, least, prior[i, i] * tolerance)
+                variance.set(select(low, least, value))
+        found = {i: variance.get() for i, variance in variances.items()}
+        return P.changed(lambda i, j, p: found[i] if i == j and i in found else p), doubtful
+
     def indefinite(self, P: Symmetric, tolerance: Fraction) -> tuple[Symmetric, list[Value]]:
         return P, indefinite(P, tolerance)
+
+
+def _same(a: Number, b: Number) -> bool:
+    return isinstance(a, Value) and isinstance(b, Value) and a.node is b.node
 
 
 def round_off(P: Symmetric, h: Vector, epsilon: Fraction) -> Value | int:

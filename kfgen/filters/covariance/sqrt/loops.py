@@ -27,7 +27,7 @@ from kfgen.filters.covariance.loops.looped import Looped, Looping
 from kfgen.filters.covariance.loops.motion import AppliedGain, ArrayGain, Displacement, array_of_gain, start_moved
 from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.parts import Gathering, Part, Scalar
+from kfgen.filters.covariance.parts import Gathering, Part, Removal, Scalar
 from kfgen.filters.covariance.sqrt.root import ArrayRoot
 from kfgen.filters.covariance.sqrt.store import SqrtStore
 from kfgen.filters.covariance.sqrt.straight import StraightSqrt
@@ -121,7 +121,7 @@ class LoopedSqrt(Looped, SqrtStore):
         self.absorber.learn(moved.space, field, rate, sure, moved.terms)
 
     def downdated(
-        self, t: Trace, P: ArrayRoot, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: ArrayRoot
+        self, t: Trace, P: ArrayRoot, c: Vector, s: Number, how: Removal, prior: ArrayRoot
     ) -> tuple[ArrayRoot, Value]:
         n, space = self.n, P.space
         if "small" not in space.arrays:
@@ -132,12 +132,12 @@ class LoopedSqrt(Looped, SqrtStore):
                 with t.loop("k", j + 1, n) as k:
                     s_jk = t.name(prior.at(j, k), "s_jk")
                     total.set(total.get() + s_jk * s_jk)
-                small[j] = total.get() * (tolerance * tolerance)
+                small[j] = total.get() * (how.tolerance * how.tolerance)
         P = self._owned(P)
         array, told = space.array("c", n), space.array("told", 2)
         fill(t, array, c)
         arrays: list[Passed] = [(each.name, 0) for each in (*self.absorber.arrays(space), array, space.arrays["small"])]
-        t.call(remove_root(self.kernels, n), [*arrays, t.value(s), t.value(tolerance), (told.name, 0)])
+        t.call(remove_root(self.kernels, n), [*arrays, t.value(s), t.value(how.tolerance), (told.name, 0)])
         t.flag(told[1] > 0, "REGULARIZED")
         return P, told[0] > 0
 

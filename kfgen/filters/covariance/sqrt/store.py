@@ -12,6 +12,7 @@ from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.numbers import constant_root, select, sqrt
 from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.base import CONST_KF, KF, Block
+from kfgen.filters.covariance.definite import Definite
 from kfgen.filters.covariance.kernels.function import integer
 from kfgen.filters.covariance.names import entry
 from kfgen.ir.program import Argument, Function
@@ -19,7 +20,7 @@ from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
 
 
-class SqrtStore:
+class SqrtStore(Definite):
     """The field `S`."""
 
     title = "lower triangular square root"

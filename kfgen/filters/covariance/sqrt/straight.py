@@ -26,7 +26,7 @@ from kfgen.filters.covariance.loops.partly import FactorsInLoops
 from kfgen.filters.covariance.motion import VectorGain
 from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
-from kfgen.filters.covariance.parts import Columns, Gatherer, Gathering, Motion, Scalar
+from kfgen.filters.covariance.parts import Columns, Gatherer, Gathering, Motion, Removal, Scalar
 from kfgen.filters.covariance.sqrt.store import SqrtStore
 from kfgen.filters.covariance.straight import StraightLine
 from kfgen.ir.trace import Array, Trace, Value
@@ -102,7 +102,8 @@ class StraightSqrt(StraightLine, SqrtStore):
         """Never: it is a square."""
         return P, []
 
-    def downdated(self, t: Trace, P: Rows, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: Rows
+    def downdated(
+        self, t: Trace, P: Rows, c: Vector, s: Number, how: Removal, prior: Rows
     ) -> tuple[Rows, Value]:
         """S S^T - w w^T, w = c / sqrt(s), by the downdate of van der Merwe & Wan 2001 (Golub & Van Loan 6.5.4).
 
@@ -118,10 +119,10 @@ class StraightSqrt(StraightLine, SqrtStore):
         for j in reversed(range(n)):
             if is_zero(w[j]):
                 continue
-            small = tolerance * tolerance * dot(prior[j][j:], prior[j][j:])
+            small = how.tolerance * how.tolerance * dot(prior[j][j:], prior[j][j:])
             acts = left & (w[j] * w[j] > small)
             square = S[j][j] * S[j][j] - w[j] * w[j]
-            limit = S[j][j] * S[j][j] * tolerance
+            limit = S[j][j] * S[j][j] * how.tolerance
             failed = failed | (acts & (square < -limit))
             gone = acts & (square <= limit)
             t.flag(gone, "REGULARIZED")

@@ -27,7 +27,7 @@ from kfgen.filters.covariance.loops.motion import (
 )
 from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
-from kfgen.filters.covariance.parts import Gatherer, Gathering, Part, Scalar
+from kfgen.filters.covariance.parts import Gatherer, Gathering, Part, Removal, Scalar
 from kfgen.filters.covariance.ud.store import UDStore
 from kfgen.filters.covariance.ud.straight import StraightUD, limited
 from kfgen.filters.frame.runs import Put
@@ -225,14 +225,14 @@ class LoopedUD(Looped, UDStore):
         return LoopedFactors(t, self.absorber, self.order, Q, noise, how, lambda space: ArrayFactors(space, own=True))
 
     def downdated(
-        self, t: Trace, P: ArrayFactors, c: Vector, s: Number, tolerance: Fraction, sure: bool, prior: ArrayFactors
+        self, t: Trace, P: ArrayFactors, c: Vector, s: Number, how: Removal, prior: ArrayFactors
     ) -> tuple[ArrayFactors, Value]:
         P = self._owned(P)
         array = P.space.array("c", self.n)
         fill(t, array, c)
-        known = None if sure else tolerance
+        known = None if how.sure else how.tolerance
         # the points' rounding is in c
-        return P, self.absorber.remove(P.space, array, t.value(s), 1024 * tolerance, known)
+        return P, self.absorber.remove(P.space, array, t.value(s), 1024 * how.tolerance, known)
 
     def indefinite(self, P: ArrayFactors, tolerance: Fraction) -> tuple[ArrayFactors, list[Value]]:
         """Never: D is not negative."""

@@ -9,12 +9,13 @@ from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.numbers import assume_nonnegative, sqrt
 from kfgen.filters.algebra.triangles import strict_size, strict_start, upper_start
 from kfgen.filters.base import Block
+from kfgen.filters.covariance.definite import Definite
 from kfgen.filters.covariance.names import entries, entry
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 
 
-class UDStore:
+class UDStore(Definite):
     """The fields `U` and `D`. order: inner position -> state of the spec."""
 
     title = "U D U^T"

@@ -16,7 +16,7 @@ from kfgen.filters.covariance.loops.partly import FactorsInLoops
 from kfgen.filters.covariance.motion import VectorGain
 from kfgen.filters.covariance.names import entry_next
 from kfgen.filters.covariance.noise import NEGATIVE, Additive
-from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Scalar
+from kfgen.filters.covariance.parts import Columns, GainChange, Gatherer, Gathering, Motion, Removal, Scalar
 from kfgen.filters.covariance.straight import StraightLine
 from kfgen.filters.covariance.ud.store import UDStore
 from kfgen.ir.trace import Array, Trace, Value
@@ -176,14 +176,15 @@ class StraightUD(StraightLine, UDStore):
             return FactorsInLoops(t, self.order, Q, noise, how, finish)
         return GatheredFactors(t, Q, noise, how, finish)
 
-    def downdated(self, t: Trace, P: Factors, c: Vector, s: Number, tolerance: Fraction, sure: bool,
-                  prior: Factors) -> tuple[Factors, Value]:  # fmt: skip
+    def downdated(
+        self, t: Trace, P: Factors, c: Vector, s: Number, how: Removal, prior: Factors
+    ) -> tuple[Factors, Value]:
         U, D = [list(row) for row in P[0]], list(P[1])
         smallest = None
-        if not sure:
+        if not how.sure:
             dense = self.entries(P)
-            smallest = [dense[j, j] * tolerance for j in range(self.n)]
-        failed, gone = downdate(U, D, c, s, 1024 * tolerance, smallest)  # the points' rounding is in c
+            smallest = [dense[j, j] * how.tolerance for j in range(self.n)]
+        failed, gone = downdate(U, D, c, s, 1024 * how.tolerance, smallest)  # the points' rounding is in c
         t.flag(gone, "REGULARIZED")
         return (U, D), failed
 

@@ -1,0 +1,182 @@
+"""Unscented filters where points spread beyond a turn, and where rounding could lock a filter out.
+
+A failure here is the algorithm's, or the reference's where both are wrong together: right values are stated.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from variants import built
+
+from kfgen.override import override
+from kfgen.reference import reference
+from kfgen.spec import loads
+from kfgen.spec.types import Spec
+from kfgen.status import ERROR
+
+FORMS = {
+    "full": "covariance: full",
+    "ud": "covariance: ud",
+    "sqrt": "covariance: sqrt",
+    "sequential": "sequential: true",
+    "cubature": "covariance: full, sigma_points: {kind: cubature}",
+    "julier": "covariance: full, sigma_points: {kind: julier, kappa: 1}",
+    "kept": "covariance: full, sigma_points: {redraw: false}",
+    "kept-ud": "covariance: ud, sigma_points: {redraw: false, alpha: 1e-3}",
+}
+UNROLL = ("full", "none")
+
+WIDE = """
+kfgen: 1
+name: wide
+scalar: double
+dt: 0.1
+parameters: {bend: 0.5}
+states:
+  x: {init: 0, std: 1}
+  y: {init: 0, std: 1}
+  yaw: {init: 0, std: STD, kind: angle}
+  v: {init: 0, std: 1}
+  b: {init: 0, std: 1}
+dynamics: {f: {yaw: YAW, x: X}, Q: {x: 1e-12}}
+measurements:
+  m: {z: {yaw: {h: H, std: 0.1, kind: angle}, x: {h: x + v + b + y, std: 1}}}
+filter: {type: ukf}
+"""
+
+
+def forms_of(text: str, options: str, scalar: str = "double") -> dict[str, Spec]:
+    """In straight-line code and in loops."""
+    text = text.replace("{type: ukf", "{type: ukf, " + options)
+    return {how: override(loads(f"{text}code: {{unroll: {how}}}\n"), scalar) for how in UNROLL}
+
+
+def wide(std: float, yaw: str = "yaw", x: str = "x", h: str = "yaw") -> str:
+    return WIDE.replace("STD", repr(std)).replace("YAW", yaw).replace("X}", f"{x}}}").replace("H,", f"{h},")
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("std", [1.8, 2.5])
+def test_an_angle_that_is_passed_on_linearly_keeps_its_variance(form, std):
+    """However wide it is, in predict and in the innovation; what bends beside it makes no difference."""
+    for yaw, x, added in (("yaw", "x", 0.0), ("yaw + dt*b", "x + dt*v*cos(b)", 0.01), ("yaw + bend*v*v", "x", 0.5)):
+        for how, kf in built(forms_of(wide(std, yaw, x), FORMS[form])).items():
+            ref = reference(loads(wide(std, yaw, x).replace("{type: ukf", "{type: ukf, " + FORMS[form])))
+            assert kf.predict() == ref.predict() == 0
+            if "v*v" not in yaw:
+                assert ref.P[2, 2] == pytest.approx(std**2 + added)
+            assert kf.P[2, 2] == pytest.approx(ref.P[2, 2], rel=1e-6), how
+            assert kf.P[2, 2] > 0.99 * std**2
+            assert kf.update("m", [0.3, 0.2]) == ref.update("m", [0.3, 0.2]) == 0
+            np.testing.assert_allclose(kf.x, ref.x, rtol=1e-6, atol=1e-9)
+            np.testing.assert_allclose(kf.P, ref.P, rtol=1e-6, atol=1e-8)
+            assert ref.P[2, 2] == pytest.approx(0.01 * std**2 / (std**2 + 0.01), rel=0.01) or added
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_an_image_that_jumps_is_wrapped(form):
+    """A bearing less the heading, across the back: linear in the heading, but atan2 jumps."""
+    bearing = '"atan2(0.1*y, x - 10) - yaw"'
+    text = wide(0.2, h=bearing).replace("x: {init: 0, std: 1}", "x: {init: 0, std: 0.1}")
+    for how, kf in built(forms_of(text, FORMS[form])).items():
+        ref = reference(loads(text.replace("{type: ukf", "{type: ukf, " + FORMS[form])))
+        assert kf.predict() == ref.predict() == 0
+        assert kf.update("m", [math.pi, 0.0]) == ref.update("m", [math.pi, 0.0]) == 0
+        assert abs(ref.x[2]) < 0.01
+        assert 0.005 < ref.P[2, 2] < 0.012
+        np.testing.assert_allclose(kf.x, ref.x, rtol=1e-6, atol=1e-8, err_msg=how)
+        np.testing.assert_allclose(kf.P, ref.P, rtol=1e-6, atol=1e-8, err_msg=how)
+
+
+EXACT = """
+kfgen: 1
+name: exact
+scalar: double
+dt: 1
+states: {x: {init: 0, std: 1}, v: {init: 0, std: 1}}
+dynamics: {f: {}, Q: {x: 0}}
+measurements: {m: {z: {z: {h: HH, std: 0}}}}
+filter: {type: ukf, adaptive: true}
+"""
+
+
+@pytest.mark.parametrize("form", ["full", "ud", "sqrt", "sequential", "cubature", "kept"])
+@pytest.mark.parametrize("h", ["0.3*x + 0.7*v", "2*x - 0.7*v"])
+@pytest.mark.parametrize("scalar", ["double", "float"])
+def test_a_direction_that_is_known_is_not_measured_again(form, h, scalar):
+    """Without noise and with an innovation that cannot be: skipped, whatever `adaptive` thinks of it."""
+    text = EXACT.replace("HH", h)
+    for how, kf in built(forms_of(text, FORMS[form], scalar)).items():
+        ref = reference(loads(text.replace("{type: ukf", "{type: ukf, " + FORMS[form])))
+        for each in (kf, ref):
+            assert each.update("m", [1.0]) < ERROR
+            x, P = each.x, each.P
+            assert each.update("m", [2.0]) & ~1 == 0, how
+            np.testing.assert_allclose(each.x, x, atol=1e-6)
+            np.testing.assert_allclose(each.P, P, atol=1e-6)
+            assert each.nis == 0.0
+
+
+SINGULAR = """
+kfgen: 1
+name: singular_noise
+scalar: double
+dt: 0.1
+states: {p: {init: 1, std: 1}, v: {init: 0, std: 1}}
+dynamics: {f: {p: p + dt*v, v: "v - dt*sin(p)"}, Q: {p: 1e-4, v: 1e-4}}
+measurements: {m: {z: {y: {h: HH}, w: {h: GG}}, R: RR}}
+filter: {type: ukf}
+"""
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("R", ["[[0.01, 0.01], [0.01, 0.01]]", "[[1e-8, 0], [0, 1e-8]]", "[[0, 0], [0, 1e-8]]"])
+@pytest.mark.parametrize("h", [("p*abs(p)", "sin(v)"), ("p*abs(p)", "p*abs(p)"), ("sin(p)", "p*v")])
+@pytest.mark.parametrize("scalar", ["double", "float"])
+def test_no_measurement_locks_a_filter_out(form, R, h, scalar):
+    """Singular noise, repeated sensors, a noise far below the state's, none at all."""
+    text = SINGULAR.replace("HH", h[0]).replace("GG", h[1]).replace("RR", R)
+    rng = np.random.default_rng(5)
+    z = 0.3 + 1e-4 * rng.normal(size=(30, 2))
+    ref = reference(loads(text.replace("{type: ukf", "{type: ukf, " + FORMS[form])))
+    for filters in (built(forms_of(text, FORMS[form], scalar)), {"reference": ref}):
+        for how, kf in filters.items():
+            for reading in z:
+                assert kf.predict() < ERROR, how
+                assert kf.update("m", reading) < ERROR, how
+                assert np.all(kf.P.diagonal() >= 0.0), how
+
+
+FAR = """
+kfgen: 1
+name: distant
+scalar: float
+dt: 0.1
+states: {p: {init: 0, std: STD}, v: {init: 0, std: STD}, a: {init: 0, std: STD}}
+dynamics:
+  f: {p: p + dt*v + dt**2/2*a, v: v + dt*a, a: a - 0.01*sin(a)}
+  Q: {p: 1e-6, v: 1e-6, a: 1e-6}
+measurements: {m: {z: {p: {h: p + 1e-9*p*abs(p), std: 0.01}, q: {h: QQ, std: 0.01}}}}
+filter: {type: ukf}
+"""
+
+
+@pytest.mark.parametrize("form", ["full", "cubature", "julier", "kept", "adaptive", "adapt_R"])
+@pytest.mark.parametrize("q", ["p + 1e-9*p*abs(p)", "2*p + 1e-3*v"])
+def test_variances_far_above_the_noise(form, q):
+    """P0 / R up to 1e14, which a float cannot hold: no error, no negative variance, and the filter converges."""
+    options = {"adaptive": "covariance: full, adaptive: true", "adapt_R": "covariance: full, adapt_R: 0.1", **FORMS}
+    for std in ("100", "1e5"):
+        text = FAR.replace("STD", std).replace("QQ", q)
+        rng = np.random.default_rng(3)
+        for how, kf in built(forms_of(text, options[form], "float")).items():
+            for k in range(50):
+                p = 5 + 0.2 * (k + 1)
+                second = p if q.startswith("p") else 2 * p + 2e-3
+                assert kf.predict() < ERROR, (how, k)
+                assert kf.update("m", [p, second] + 0.01 * rng.normal(size=2)) < ERROR, (how, k)
+                assert np.all(kf.P.diagonal() >= 0.0), (how, k)
+            assert abs(kf.x[0] - 15.0) < 0.1, how
