@@ -96,7 +96,8 @@ class Ekf(SingleFilter):
         values = [v for rows in (F, result.Q) for row in rows for v in row]
         values += [v for w, d in noise for v in (*w, d)]
         guards.doubts(t, [*result.x, *values])
-        guards.finite(t, [x[i] for i in sorted(moved)] + evidence, values)
+        # loops hide how the evidence is made: of all columns of F and of the noise
+        guards.finite(t, [x[i] for i in sorted(moved)] + evidence, [] if self.form.indexed else values)
         yield Made(x, P)
         self.store(t, x, moved if t.in_place else set(range(len(x))), P, after_predict=True)
         self.compensation.store(t, rests, free, x)
@@ -239,6 +240,8 @@ class Ekf(SingleFilter):
 
     def _entering(self, innovation: Innovation, result: Updated[Any]) -> list[Value]:
         """What enters the estimate: innovation variances, and through them R and H."""
+        if self.form.indexed:  # loops hide how nis and x are made of y and H
+            return [*result.s, *innovation.variances]
         return [*result.s, *self._model_values(innovation)]
 
     def _model_values(self, innovation: Innovation) -> list[Value]:
