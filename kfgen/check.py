@@ -130,7 +130,7 @@ def compare(
     differences: list[str] = []
     calls, lost, errors_differ = 0, 0, False
     tolerance = tolerance_of(spec.scalar)
-    grain = _Grain(list(kf.states)) if spec.scalar == FLOAT else None
+    grain = _Grain(list(kf.states), spec.code.compensated) if spec.scalar == FLOAT else None
     for row in range(steps):
         for call in _calls(spec, work, row, random):
             ours, theirs = _made(kf, call), _made(ref, call)
@@ -223,8 +223,9 @@ def _rounded(kf: NativeFilter, work: Plan) -> Plan:
 class _Grain:
     """What a float's resolution is against the standard deviations along the track."""
 
-    def __init__(self, names: list[str]) -> None:
+    def __init__(self, names: list[str], compensated: tuple[str, ...]) -> None:
         self.names = names
+        self._whole = np.array([name in compensated for name in names])  # what two floats hold
         self._x: list[Array] = []
         self._sigma: list[Array] = []
 
@@ -235,7 +236,7 @@ class _Grain:
     def coarse(self) -> tuple[str, ...]:
         """A sentence for each state that most rows resolve too coarsely."""
         x, sigma = np.abs(self._x), np.array(self._sigma)
-        most = too_coarse(x, sigma).mean(axis=0) > 0.5
+        most = (too_coarse(x, sigma).mean(axis=0) > 0.5) & ~self._whole
         size, spread = np.median(x, axis=0), np.median(sigma, axis=0)
         return tuple(
             f"{self.names[i]}: float resolves {size[i]:.3g} to {ulp(size[i]):.2g}, beside a standard deviation of "

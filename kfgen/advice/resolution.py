@@ -37,7 +37,7 @@ def advice(spec: Spec, tracks: Sequence[Track]) -> Iterator[Advice]:
     for track in tracks:
         magnitude = np.abs(track.x).max(axis=0)
         grain, step = ulp(magnitude), np.median(np.abs(track.step), axis=0)
-        doubtful = _doubtful(track, grain)
+        doubtful = _doubtful(track, grain) & [state.name not in spec.code.compensated for state in spec.states]
         if not doubtful.any():
             continue
         sigma = _settled(track)

@@ -195,7 +195,7 @@ def test_banks():
     assert len(set(private)) == len(private)
     straight = flash(build(replace(spec, code=replace(spec.code, unroll="full"))))
     assert flash(looped) < straight
-    for budget in (straight, int(MARGIN * straight) + 1):
+    for budget in (straight, int(MARGIN * (straight + 2))):  # a prediction is a sum of whole bytes, a function each
         made = build(replace(spec, code=replace(spec.code, flash=budget)))
         assert ("loops" in made.summary.forms.values()) == (budget == straight)
         assert flash(made) <= budget
