@@ -1,5 +1,5 @@
 # make demo   build specs/vehicle.yaml, simulate a log, run the filter over it, plot
-# make test   all tests
+# make test   all tests but those that are marked long
 # make lint   style, types, and whether generated/ is up to date
 # make bench  instructions, flash, RAM and stack on an emulated Cortex-M4F
 # make golden rewrite generated/ and the README's piece of C

@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 import time
 
+import pytest
+
 from kfgen.advice import advise
 from kfgen.generate import build
 from kfgen.spec import loads
@@ -28,6 +30,7 @@ def test_constants_that_use_two_of_the_one_before():
     assert seconds(text) < 5
 
 
+@pytest.mark.long
 def test_long_equations():
     """20 equations of about 1,700 nodes in 20 states."""
     draw = random.Random(1)
@@ -44,6 +47,7 @@ def test_long_equations():
     assert seconds(text) < 40
 
 
+@pytest.mark.long
 def test_many_states():
     assert seconds(problems.chain(64)) < 40
 
