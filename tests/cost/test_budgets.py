@@ -29,7 +29,7 @@ WITHIN = 0.25
 def measured(spec):
     generated = build(spec, judge=False)
     flags = recommended_flags(generated.view)
-    return generated.summary.prediction, measure(generated, simulate(spec, 6), flags=flags)
+    return generated.summary.prediction, measure(generated, simulate(spec, 20), flags=flags)  # the deepest paths
 
 
 def test_every_spec_is_predicted(needs):
