@@ -28,8 +28,9 @@ from kfgen.status import ERROR, Status
 BAD = (math.nan, math.inf, -math.inf)
 LARGE = {"float": (1e38, 3e38, 1e20, 1e-38), "double": (1e308, 1e200, 1e-308)}
 Call = tuple[dict[str, np.ndarray], dict[str, float]]  # arguments, parameters
-KINDS = [(kind, "float") for kind in ("kf", "ekf", "iekf", "ekf2", "ukf", "imm", "steady")]
-KINDS += [("ekf", "double"), ("imm", "double")]
+KINDS = [(kind, "float") for kind in ("kf", "ekf", "ukf", "steady")]
+LONG = [("iekf", "float"), ("ekf2", "float"), ("imm", "float"), ("ekf", "double"), ("imm", "double")]
+KINDS += [pytest.param(*case, marks=pytest.mark.long) for case in LONG]
 
 
 def built(kind: str, scalar: str) -> Iterator[tuple[str, Spec, NativeFilter]]:
