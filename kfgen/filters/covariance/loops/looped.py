@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -35,7 +36,7 @@ class Looping:
     table: tuple[str, str]
 
 
-class Looped:
+class Looped(ABC):
     """Covariances stand in arrays; private functions do what is done to them.
 
     sibling: the same form in straight-line code. learns_early: see Learning.
@@ -70,6 +71,6 @@ class Looped:
     def at_rest(self, t: Trace, P: Spaced) -> Displacement:
         return Displacement(P.space, self.n, self.learn, self.learns_early)
 
+    @abstractmethod
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         """See loops.motion.Learner."""
-        raise NotImplementedError

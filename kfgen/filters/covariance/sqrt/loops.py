@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from fractions import Fraction
 
 from kfgen.filters.algebra.linalg import Rows, Vector, times
@@ -21,10 +21,10 @@ from kfgen.filters.algebra.triangles import strict_start
 from kfgen.filters.covariance.kernels.function import Passed, integer
 from kfgen.filters.covariance.kernels.points import remove_root
 from kfgen.filters.covariance.kernels.updates import carlson
-from kfgen.filters.covariance.loops.absorber import Absorber
+from kfgen.filters.covariance.loops.by_factors import ByFactors
 from kfgen.filters.covariance.loops.gather import LoopedFactors
-from kfgen.filters.covariance.loops.looped import Looped, Looping
-from kfgen.filters.covariance.loops.motion import AppliedGain, ArrayGain, Displacement, array_of_gain, start_moved
+from kfgen.filters.covariance.loops.looped import Looping
+from kfgen.filters.covariance.loops.motion import AppliedGain, ArrayGain, Displacement
 from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Gathering, Part, Removal, Scalar
@@ -35,17 +35,12 @@ from kfgen.filters.frame.runs import Put
 from kfgen.ir.trace import Array, Trace, Value
 
 
-class LoopedSqrt(Looped, SqrtStore):
+class LoopedSqrt(ByFactors, SqrtStore):
     """The same steps as the straight sibling's."""
 
     def __init__(self, sibling: StraightSqrt, how: Looping) -> None:
-        Looped.__init__(self, sibling, how)
+        ByFactors.__init__(self, sibling, how)
         SqrtStore.__init__(self, sibling.n)
-        self.absorber = Absorber(how.names, how.kernels, how.table)
-
-    @property
-    def tables(self) -> Mapping[str, tuple[int, ...]]:
-        return self.absorber.tables
 
     def plain(self) -> LoopedSqrt:
         return self
@@ -98,27 +93,16 @@ class LoopedSqrt(Looped, SqrtStore):
         self, t: Trace, P: ArrayRoot, measurements: list[Scalar], motion: Displacement
     ) -> tuple[ArrayRoot, list[AppliedGain | ArrayGain]]:
         (scalar,) = measurements
-        nu, measurement = scalar.innovation(motion), scalar.measurement
-        n, space = self.n, P.space
+        measurement, moves = scalar.measurement, not self.steps
         P = self._owned(P)
-        U, D = self.absorber.arrays(space)
-        gain = array_of_gain(space, "gain", n, motion, self.steps) if self.steps else None
-        moved = None if self.steps else start_moved(space, n, motion)
-        s = space.array("s", 2)
-        first, last = space.row(measurement.h)
-        function = carlson(self.kernels, n, is_positive(measurement.r), self.weighted, moved is not None)
-        row: list[Passed] = [("h", 0), integer(t, first), integer(t, last), t.value(measurement.r)]
-        weight = [t.value(measurement.g)] if self.weighted else []
-        target: list[Passed] = [(gain.name, 0)] if gain is not None else [t.value(nu), ("moved", 0)]
-        t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *target, (s.name, 0)])
-        variance = t.name(s[0], "variance")
-        if moved is not None:
-            return P, [AppliedGain(moved, variance, s[1], sound=True)]
-        assert gain is not None
-        return P, [ArrayGain(t, gain, nu, variance, sound=True)]
+        space = P.space
+        function = carlson(self.kernels, self.n, is_positive(measurement.r), self.weighted, moves)
 
-    def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
-        self.absorber.learn(moved.space, field, rate, sure, moved.terms)
+        def row() -> list[Passed]:
+            first, last = space.row(measurement.h)
+            return [("h", 0), integer(t, first), integer(t, last)]
+
+        return P, [self.measured(space, scalar, motion, moves, function, row)]
 
     def downdated(
         self, t: Trace, P: ArrayRoot, c: Vector, s: Number, how: Removal, prior: ArrayRoot

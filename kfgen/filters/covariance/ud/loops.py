@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
@@ -14,16 +14,14 @@ from kfgen.filters.algebra.triangles import strict, strict_size, strict_start
 from kfgen.filters.covariance.kernels.function import Passed, integer
 from kfgen.filters.covariance.kernels.points import solve
 from kfgen.filters.covariance.kernels.updates import bierman
-from kfgen.filters.covariance.loops.absorber import Absorber
+from kfgen.filters.covariance.loops.by_factors import ByFactors
 from kfgen.filters.covariance.loops.gather import LoopedFactors
-from kfgen.filters.covariance.loops.looped import Looped, Looping
+from kfgen.filters.covariance.loops.looped import Looping
 from kfgen.filters.covariance.loops.motion import (
     AppliedGain,
     ArrayGain,
     Displacement,
-    array_of_gain,
     changed_gain,
-    start_moved,
 )
 from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
@@ -50,19 +48,14 @@ class ArrayFactors:
         return found
 
 
-class LoopedUD(Looped, UDStore):
+class LoopedUD(ByFactors, UDStore):
     """The update by joseph's form is Bierman's and, for a changed gain, a rank-one term."""
 
     def __init__(self, sibling: StraightUD, how: Looping) -> None:
-        Looped.__init__(self, sibling, how)
+        ByFactors.__init__(self, sibling, how)
         UDStore.__init__(self, sibling.order)
         self.form = sibling.form
         self.change = sibling.change
-        self.absorber = Absorber(how.names, how.kernels, how.table)
-
-    @property
-    def tables(self) -> Mapping[str, tuple[int, ...]]:
-        return self.absorber.tables
 
     def plain(self) -> LoopedUD:
         if self.change is None:
@@ -107,40 +100,27 @@ class LoopedUD(Looped, UDStore):
         self, t: Trace, P: ArrayFactors, measurements: list[Scalar], motion: Displacement
     ) -> tuple[ArrayFactors, list[AppliedGain | ArrayGain]]:
         (scalar,) = measurements
-        nu, measurement = scalar.innovation(motion), scalar.measurement
-        n, space = self.n, P.space
+        measurement, moves = scalar.measurement, self.change is None and not self.steps
         P = self._owned(P)
-        U, D = self.absorber.arrays(space)
-        moves = self.change is None and not self.steps
-        gain = None if moves else array_of_gain(space, "gain", n, motion, self.steps)
-        moved = start_moved(space, n, motion) if moves else None
-        s = space.array("s", 2)
+        space = P.space
         seen = [i for i, x in enumerate(measurement.h) if not is_zero(x)]
-        function = bierman(self.kernels, n, len(seen) == 1, is_positive(measurement.r), self.weighted, moves)
-        row: list[Passed]
-        if len(seen) == 1:
-            row = [integer(t, seen[0]), t.value(measurement.h[seen[0]])]
-        else:
+        function = bierman(self.kernels, self.n, len(seen) == 1, is_positive(measurement.r), self.weighted, moves)
+
+        def row() -> list[Passed]:
+            if len(seen) == 1:
+                return [integer(t, seen[0]), t.value(measurement.h[seen[0]])]
             first, last = space.row(measurement.h)
-            row = [("h", 0), integer(t, first), integer(t, last)]
-        row.append(t.value(measurement.r))
-        weight = [t.value(measurement.g)] if self.weighted else []
-        target: list[Passed] = [(gain.name, 0)] if gain is not None else [t.value(nu), ("moved", 0)]
-        t.call(function, [(U.name, 0), (D.name, 0), *row, *weight, *target, (s.name, 0)])
-        variance = t.name(s[0], "variance")
-        if moved is not None:
-            return P, [AppliedGain(moved, variance, s[1], sound=True)]
-        assert gain is not None
+            return [("h", 0), integer(t, first), integer(t, last)]
+
+        gain = self.measured(space, scalar, motion, moves, function, row)
         if self.change is not None:
+            assert isinstance(gain, ArrayGain)
             t.section("the gain that is applied differs from K by w: + s w w^T")
             w = self.absorber.columns(space)
-            changed_gain(t, self.change, gain, w, n)
-            added = t.value(times(measurement.g, variance))
-            self.absorber.absorb(space, False, [added, t.zero], integer(t, n))
-        return P, [ArrayGain(t, gain, nu, variance, sound=True)]
-
-    def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
-        self.absorber.learn(moved.space, field, rate, sure, moved.terms)
+            changed_gain(t, self.change, gain.array, w, self.n)
+            added = t.value(times(measurement.g, gain.s))
+            self.absorber.absorb(space, False, [added, t.zero], integer(t, self.n))
+        return P, [gain]
 
     # the covariance ----------------------------------------------------------------------------------
 

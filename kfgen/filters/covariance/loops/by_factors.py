@@ -1,0 +1,58 @@
+"""What the forms in loops that keep factors have in common: U D U^T and S S^T are changed in the same two arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from kfgen.filters.covariance.base import Straight
+from kfgen.filters.covariance.kernels.function import Passed
+from kfgen.filters.covariance.loops.absorber import Absorber
+from kfgen.filters.covariance.loops.looped import Looped, Looping
+from kfgen.filters.covariance.loops.motion import AppliedGain, ArrayGain, Displacement, array_of_gain, start_moved
+from kfgen.filters.covariance.loops.space import Space
+from kfgen.filters.covariance.parts import Scalar
+from kfgen.ir.program import Function
+
+
+class ByFactors(Looped):
+    """absorber: of U and D, which are what S is changed in, too."""
+
+    def __init__(self, sibling: Straight[Any], how: Looping) -> None:
+        super().__init__(sibling, how)
+        self.absorber = Absorber(how.names, how.kernels, how.table)
+
+    @property
+    def tables(self) -> Mapping[str, tuple[int, ...]]:
+        return self.absorber.tables
+
+    def measured(
+        self, space: Space, scalar: Scalar, motion: Displacement, moves: bool,
+        function: Function, row: Callable[[], list[Passed]],
+    ) -> AppliedGain | ArrayGain:  # fmt: skip
+        """What a private function that takes a scalar measurement into the factors makes of it.
+
+        moves: whether it applies the gain at once. row: what it is told of h.
+        """
+        t, n, measurement = space.t, self.n, scalar.measurement
+        nu = scalar.innovation(motion)
+        U, D = self.absorber.arrays(space)
+        target: list[Passed]
+        if moves:
+            moved = start_moved(space, n, motion)
+            target = [t.value(nu), (moved.name, 0)]
+        else:
+            gain = array_of_gain(space, "gain", n, motion, self.steps)
+            target = [(gain.name, 0)]
+        s = space.array("s", 2)
+        weight = [t.value(measurement.g)] if self.weighted else []
+        told = [*row(), t.value(measurement.r), *weight]
+        t.call(function, [(U.name, 0), (D.name, 0), *told, *target, (s.name, 0)])
+        variance = t.name(s[0], "variance")
+        if moves:
+            return AppliedGain(moved, variance, s[1], sound=True)
+        return ArrayGain(t, gain, nu, variance, sound=True)
+
+    def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
+        self.absorber.learn(moved.space, field, rate, sure, moved.terms)
