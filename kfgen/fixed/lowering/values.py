@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -16,18 +17,19 @@ from kfgen.fixed.program.nodes import constant, make, same, terms
 from kfgen.ir.nodes import Node
 
 
-class Values:
+class Values(ABC):
     """What all operations need: formats, shifts, limits."""
 
     def __init__(self, context: Context) -> None:
         self.c = context
 
+    @abstractmethod
     def index(self, node: Node) -> Node:
         """An expression of integers or truth values."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _value(self, node: Node, e: int | None) -> Raw:
-        raise NotImplementedError
+        """A number, in the format 2^e where it is given."""
 
     def value(self, node: Node, e: int | None = None) -> Raw:
         """A real expression in the format that suits it, or in that of exponent e."""
