@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -34,10 +35,16 @@ KINDS += [pytest.param(*case, marks=pytest.mark.long) for case in LONG]
 
 
 def built(kind: str, scalar: str) -> Iterator[tuple[str, Spec, NativeFilter]]:
+    """Filters of one's own, as init leaves them."""
+    return ((label, spec, kf.copy()) for label, spec, kf in _built(kind, scalar))
+
+
+@cache
+def _built(kind: str, scalar: str) -> list[tuple[str, Spec, NativeFilter]]:
     texts = dict(cases(kind))
     specs = [replace(override(loads(text), scalar), name=f"poison_{i}") for i, text in enumerate(texts.values())]
     filters = load_filters([build(spec) for spec in specs], flags=("-O0",))
-    return zip(texts, specs, filters, strict=True)
+    return list(zip(texts, specs, filters, strict=True))
 
 
 class Subject:

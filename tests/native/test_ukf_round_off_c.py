@@ -133,21 +133,21 @@ filter: {type: ukf}
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("R", ["[[0.01, 0.01], [0.01, 0.01]]", "[[1e-8, 0], [0, 1e-8]]", "[[0, 0], [0, 1e-8]]"])
 @pytest.mark.parametrize("h", [("p*abs(p)", "sin(v)"), ("p*abs(p)", "p*abs(p)"), ("sin(p)", "p*v")])
-@pytest.mark.parametrize("scalar", ["double", "float"])
-def test_no_measurement_locks_a_filter_out(form, R, h, scalar):
+def test_no_measurement_locks_a_filter_out(form, h):
     """Singular noise, repeated sensors, a noise far below the state's, none at all."""
-    text = SINGULAR.replace("HH", h[0]).replace("GG", h[1]).replace("RR", R)
-    rng = np.random.default_rng(5)
-    z = 0.3 + 1e-4 * rng.normal(size=(30, 2))
-    ref = reference(loads(text.replace("{type: ukf", "{type: ukf, " + FORMS[form])))
-    for filters in (built(forms_of(text, FORMS[form], scalar)), {"reference": ref}):
-        for how, kf in filters.items():
-            for reading in z:
-                assert kf.predict() < ERROR, how
-                assert kf.update("m", reading) < ERROR, how
-                assert np.all(kf.P.diagonal() >= 0.0), how
+    z = 0.3 + 1e-4 * np.random.default_rng(5).normal(size=(30, 2))
+    specs = {}
+    for R in ("[[0.01, 0.01], [0.01, 0.01]]", "[[1e-8, 0], [0, 1e-8]]", "[[0, 0], [0, 1e-8]]"):
+        text = SINGULAR.replace("HH", h[0]).replace("GG", h[1]).replace("RR", R)
+        for scalar in ("double", "float"):
+            specs |= {(R, scalar, how): spec for how, spec in forms_of(text, FORMS[form], scalar).items()}
+    references = {(R, "reference"): reference(spec) for (R, *rest), spec in specs.items() if rest == ["double", "full"]}
+    for label, kf in {**built(specs), **references}.items():
+        for reading in z:
+            assert kf.predict() < ERROR, label
+            assert kf.update("m", reading) < ERROR, label
+            assert np.all(kf.P.diagonal() >= 0.0), label
 
 
 FAR = """
