@@ -57,7 +57,8 @@ def compiled_flash(spec):
 
 # of fixed point, whose files take long to compile, the small ones
 @pytest.mark.parametrize(("scalar", "names"), [
-    (None, [path.stem for path in SPECS]), ("q16.16", ["battery", "cv4", "pendulum", "scalar", "vehicle_tutorial"]),
+    (None, [path.stem for path in SPECS]),
+    pytest.param("q16.16", ["battery", "cv4", "pendulum", "scalar", "vehicle_tutorial"], marks=pytest.mark.long),
 ])  # fmt: skip
 def test_loops_and_fixed_point_are_predicted(needs, scalar, names):
     needs("arm-none-eabi-gcc")

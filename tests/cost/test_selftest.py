@@ -79,7 +79,7 @@ def sources(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.glob("*.c") if path.name != "main.c")
 
 
-@pytest.mark.parametrize("scalar", ["own", "double"])
+@pytest.mark.parametrize("scalar", ["own", pytest.param("double", marks=pytest.mark.long)])
 def test_every_spec_passes_on_the_host(everything, scalar):
     folder = everything(scalar)
     level = "-O1" if scalar == "own" else "-O0"
@@ -93,7 +93,7 @@ def test_banks_are_followed_for_many_steps():
     assert len(record(override(spec, "float"), track_of(spec)).x) > 6
 
 
-@pytest.mark.parametrize("board", ["m4f", "m3", "rv32"])
+@pytest.mark.parametrize("board", ["m4f", *(pytest.param(each, marks=pytest.mark.long) for each in ("m3", "rv32"))])
 def test_every_spec_passes_on_an_emulated_board(everything, needs, board):
     needs(*BOARDS[board].tools)
     folder = everything("own")

@@ -217,6 +217,7 @@ def test_what_full_costs_is_told_where_it_is_a_third() -> None:
         assert advise(spec, build(spec)) == []
 
 
+@pytest.mark.long
 def test_loops_are_told_where_they_take_a_tenth() -> None:
     spec = override(loads(problems.chain(24)), filter={"covariance": "ud"})
     lines = [str(each) for each in advise(spec, build(spec)) if each.name == "loops"]

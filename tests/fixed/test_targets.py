@@ -96,7 +96,7 @@ def answered(folder: Path, sources: list[str], compiler: str, *flags: str) -> tu
     return told.returncode, told.stderr
 
 
-@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("level", [*LEVELS[:2], pytest.param("-O3", marks=pytest.mark.long)])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_on_this_machine(integers, needs, compiler, level):
     needs(compiler)
@@ -104,7 +104,7 @@ def test_on_this_machine(integers, needs, compiler, level):
 
 
 # with -O0 nothing is concluded from an overflow anyway: what is compiled is the same without the flag
-@pytest.mark.parametrize("level", LEVELS[1:])
+@pytest.mark.parametrize("level", ["-O2", pytest.param("-O3", marks=pytest.mark.long)])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_where_signed_overflow_wraps(integers, needs, compiler, level):
     """Two of the filters, which have nearly all routines between them."""
@@ -121,7 +121,9 @@ def test_nothing_undefined(integers, needs):
     assert answered(*integers, "gcc", "-O1", *checked) == (0, "")
 
 
-@pytest.mark.parametrize("board", ["m0", "m3", "m4", "rv32", "avr"])
+@pytest.mark.parametrize("board", [
+    "m0", pytest.param("m3", marks=pytest.mark.long), pytest.param("m4", marks=pytest.mark.long), "rv32", "avr"
+])  # fmt: skip
 def test_on_boards(integers, needs, board):
     folder, sources = integers
     needs(*BOARDS[board].tools)
