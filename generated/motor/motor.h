@@ -16,7 +16,7 @@
  *   update_currents  40 mul, 32 add, 2 div, 2 compare, 1 wrap
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * faeddf4460e7f13926e56d0348fab616b8261bccf75b0e55f738c6b8dab3295f
+ * 3108156ecdd281e050bf5d6574e37e2edeca207f6f18260f270223b1d11f4eab
  * This file and motor.c are yours: use, change and ship them without condition.
  */
 #ifndef MOTOR_H_INCLUDED
