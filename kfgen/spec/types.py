@@ -59,7 +59,7 @@ class State:
     variance: Expression | None  # None where P0 is given
     unit: str = ""
     range: Range | None = None
-    kind: str = "real"  # real | angle | periodic
+    kind: str = "real"  # real | angle | periodic | quaternion (a part of one: Spec.rotations)
     period: Expression | None = None  # angle: 2*pi; periodic: as written; real: None
     bounds: Range | None = None
     doc: str = ""
@@ -82,6 +82,44 @@ class Noise:
     name: str
     variance: Expression | None  # None where the full covariance of the noises is given
     density: bool = False
+    unit: str = ""
+    doc: str = ""
+    place: Place = NOWHERE
+
+
+@dataclass(frozen=True)
+class Group:
+    """A vector: consecutive scalars of one table (states, inputs, noises, ...) that stand under one name in the spec."""
+
+    name: str
+    parts: tuple[str, ...]
+    place: Place = NOWHERE
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A unit quaternion among the states (Hamilton, scalar first) or the components of a sensor, and its error.
+
+    parts: its four numbers w, x, y, z, which are states (components) of kind "quaternion"; errors: the three parts of
+    its rotation error, in rad. error: body (q [+] d = q exp(d)) or reference (exp(d) q). variances of the errors: None
+    where P0 or R is given whole.
+    """
+
+    name: str
+    parts: tuple[str, str, str, str]
+    errors: tuple[str, str, str]
+    error: str = "body"  # body | reference
+    reset: bool = True
+    variances: tuple[Expression | None, Expression | None, Expression | None] = (None, None, None)
+    place: Place = NOWHERE
+
+
+@dataclass(frozen=True)
+class Output:
+    """What firmware reads: a value and its standard deviation."""
+
+    name: str
+    value: Expression
     unit: str = ""
     doc: str = ""
     place: Place = NOWHERE
@@ -144,6 +182,9 @@ class Sensor:
     partial: bool = False
     rate: Expression | None = None  # calls a prediction; None: 1
     own: Mapping[str, Any] = field(default_factory=dict)  # robust, adaptive, adapt_R where they are not the filter's
+    inputs: tuple[Input, ...] = ()  # known values that come with this measurement
+    groups: tuple[Group, ...] = ()  # its vectors: components and inputs
+    rotations: tuple[Rotation, ...] = ()  # components that are quaternions
     doc: str = ""
     place: Place = NOWHERE
 
@@ -272,6 +313,9 @@ class Spec:
     fixed: Fixed = Fixed()
     code: Code = Code()
     imm: Imm | None = None
+    groups: tuple[Group, ...] = ()  # vectors and matrices (row by row) of constants, parameters, states, inputs, noises
+    rotations: tuple[Rotation, ...] = ()  # states that are quaternions, in order
+    outputs: tuple[Output, ...] = ()
     advice: tuple[str, ...] = ()  # names of the advice that is not wanted
     place: Place = NOWHERE
     places: Mapping[str, Place] = field(default_factory=dict)  # of the top-level keys that were written
