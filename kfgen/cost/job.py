@@ -15,6 +15,7 @@ from kfgen.logs import Log, as_log
 from kfgen.native.emitted import Emitted
 from kfgen.native.run import plan
 from kfgen.native.values import Units, value_of
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 
 ROWS = 60
@@ -111,17 +112,14 @@ def _steps(spec: Spec, declared: Declarations, log: Log) -> list[Step]:
         u = {"u": scalar.to_raw(work.u[row], units.u)} if spec.inputs else {}
         if work.step[row]:
             steps.append(Step("predict", {**u, "dt": scalar.to_raw(work.dt[row : row + 1], units.dt)}))
-        first = 0
-        for i, sensor in enumerate(spec.measurements):
-            last = first + len(sensor.components)
-            bits, full = int(work.mask[row, i]), (1 << (last - first)) - 1
+        for i, (sensor, place) in enumerate(readings_of(spec)):
+            bits, full = int(work.mask[row, i]), (1 << len(sensor.components)) - 1
             if bits:
-                given = scalar.near(work.z[row, first:last], units.z_periods[sensor.name])
+                given = scalar.near(work.z[row, place], units.z_periods[sensor.name])
                 z = {f"z_{sensor.name}": scalar.to_raw(given, units.z[sensor.name])}
                 if bits == full:
                     steps.append(Step(f"update_{sensor.name}", {**u, **z}))
                 else:
                     mask = {"mask": np.array([bits], dtype=np.uint32)}
                     steps.append(Step(f"update_{sensor.name}_masked", {**u, **z, **mask}))
-            first = last
     return steps

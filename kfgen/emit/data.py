@@ -23,6 +23,7 @@ class SensorView:
     name: str
     NAME: str
     components: tuple[Named, ...]
+    fields: tuple[Named, ...]  # the components, and what else comes with a measurement
 
 
 @dataclass(frozen=True)

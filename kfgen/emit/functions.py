@@ -15,6 +15,7 @@ from kfgen.ir.count import operations
 from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import Argument, Flag, Function, Guard, walk
 from kfgen.scalars import Scalar
+from kfgen.spec.sensors import fields_of
 
 
 class FunctionMaker:
@@ -107,7 +108,7 @@ class FunctionMaker:
         sensor = f.name.removeprefix("update_")
         for s in self.spec.measurements:
             if s.name == sensor:
-                docs["z"] = ", ".join(with_unit(c.name, c.unit) for c in s.components)
+                docs["z"] = ", ".join(with_unit(c.name, c.unit) for c in fields_of(s))
         out = []
         width = max(len(a.name) for a in f.arguments)
         for a in f.arguments:

@@ -16,6 +16,8 @@ from kfgen.filters.base import FilterCode
 from kfgen.ir.names import LIBRARY_NAMES
 from kfgen.ir.nodes import Constants, Table
 from kfgen.scalars import Scalar
+from kfgen.spec.sensors import fields_of
+from kfgen.spec.types import Sensor
 
 
 def package_version() -> str:
@@ -23,6 +25,11 @@ def package_version() -> str:
         return version("kfgen")
     except PackageNotFoundError:
         return "0"
+
+
+def _sensor(sensor: Sensor) -> SensorView:
+    fields = header.members(fields_of(sensor))
+    return SensorView(sensor.name, sensor.name.upper(), fields[: len(sensor.components)], fields)
 
 
 def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPoint | None = None) -> View:
@@ -63,7 +70,7 @@ def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPo
         cost_table=tuple(header.cost_table(maker.costs)),
         advice=code.notes,
         inputs=header.members(spec.inputs),
-        sensors=tuple(SensorView(s.name, s.name.upper(), header.members(s.components)) for s in spec.measurements),
+        sensors=tuple(_sensor(s) for s in spec.measurements),
         parameters=header.members(spec.parameters),
         modes=struct.modes(name, code.blocks),
         fields=struct.fields(name, code.blocks, bool(spec.parameters)),

@@ -57,6 +57,11 @@ class SensorModel:
         return tuple(part_of(period) for period in self.periods)
 
     @property
+    def inputs(self) -> tuple[str, ...]:
+        """Known values that come with a measurement; their fields stand behind the components'."""
+        return tuple(i.name for i in self.spec.inputs)
+
+    @property
     def dimension(self) -> int:
         """Degrees of freedom of an innovation."""
         return sum(part.dimension for part in self.parts)
@@ -270,8 +275,8 @@ class _Builder:
         return tuple(tuple(variances[i] if i == j else sympy.S.Zero for j in range(q)) for i in range(q))
 
     def sensor(self, sensor: Sensor) -> SensorModel:
-        for noise in sensor.noise:
-            self.declare(noise.name)
+        for name in (*(w.name for w in sensor.noise), *(i.name for i in sensor.inputs)):
+            self.declare(name)
         m = len(sensor.components)
         if sensor.R is not None:
             R = self.matrix(sensor.R)

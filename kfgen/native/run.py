@@ -14,6 +14,7 @@ from kfgen.logs import Log, Source, as_log
 from kfgen.native.struct import Struct
 from kfgen.native.values import Array
 from kfgen.spec.constants import value
+from kfgen.spec.sensors import columns_of, readings_of
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status
 
@@ -64,7 +65,7 @@ class Plan:
     """What is to be done in each row; float64, physical.
 
     step: [N] whether to predict. dt: [N] s. u: [N, nu]. mask: [N, sensors] bits of the components to use, 0
-    for no update. z: [N, components of all sensors], 0 where there is none. t: [N] s.
+    for no update. z: [N, components and own inputs of all sensors], 0 where there is none. t: [N] s.
     """
 
     t: Array
@@ -81,9 +82,9 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
     Per row: predict, then the updates in the spec's order. Run-time dt: t minus the t of the row before; no
     predict in the first row and where t is equal. Fixed dt (`dt` gives it in s for `t`): one predict per row, none
     where there is a t and it is that of the row before.
-    A sensor is updated where all its components are there; with `partial: true` the components that are there
-    are used, otherwise a half-filled row of a sensor is no measurement. An empty input keeps the value of the
-    row before; an input that is empty in the first row is a KfgenError.
+    A sensor is updated where all its components are there, and its own inputs with them; with `partial: true` the
+    components that are there are used, otherwise a half-filled row of a sensor is no measurement. An empty input
+    keeps the value of the row before; an input that is empty in the first row is a KfgenError.
     """
     rows, columns = log.rows, log.columns
     run_time = spec.dt is not None and spec.dt.run_time
@@ -103,11 +104,12 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
     values: list[Array] = []
     absent = np.full(rows, np.nan)
     for i, sensor in enumerate(spec.measurements):
-        names = [f"{sensor.name}.{each.name}" for each in sensor.components]
-        z = np.column_stack([columns.get(name, absent) for name in names])
-        bits = (~np.isnan(z)) @ (1 << np.arange(z.shape[1]))
-        full = (1 << z.shape[1]) - 1
+        z = np.column_stack([columns.get(name, absent) for name in columns_of(sensor)])
+        m = len(sensor.components)
+        bits = (~np.isnan(z[:, :m])) @ (1 << np.arange(m))
+        full = (1 << m) - 1
         mask[:, i] = bits if sensor.partial else np.where(bits == full, full, 0)
+        mask[np.isnan(z[:, m:]).any(axis=1), i] = 0
         values.append(np.where(np.isnan(z), 0.0, z))
     return Plan(t, step.astype(np.uint8), difference, u, mask, np.hstack(values) if values else np.empty((rows, 0)))
 
@@ -197,13 +199,10 @@ def _refuse(work: Plan, arrays: Mapping[str, NDArray[Any]], spec: Spec) -> None:
     wrong = ~np.isfinite(np.column_stack([work.u, work.dt])).all(axis=1) & (work.step != 0)
     status[wrong, 0] = Status.NOT_FINITE
     arrays["step"][wrong] = 0
-    first = 0
-    for i, sensor in enumerate(spec.measurements):
-        last = first + len(sensor.components)
-        wrong = ~np.isfinite(work.z[:, first:last]).all(axis=1)
+    for i, (_, place) in enumerate(readings_of(spec)):
+        wrong = ~np.isfinite(work.z[:, place]).all(axis=1)
         status[wrong, i + 1] = Status.NOT_FINITE
         arrays["mask"][wrong, i] = 0
-        first = last
 
 
 def fixed_step(spec: Spec) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kfgen.reference.algorithm import Correction, Estimator
+from kfgen.reference.arguments import components_used, own_inputs
 from kfgen.reference.clock import Clock, step_of
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.linalg import lower_root, udu
@@ -18,7 +19,7 @@ from kfgen.reference.mode import ModeView
 from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.parameters import Parameters
 from kfgen.reference.reading import Read
-from kfgen.reference.sensor import Reading, SensorModel
+from kfgen.reference.sensor import Reading
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.types import Filter, Spec
 
@@ -195,18 +196,21 @@ class ReferenceFilter:
         return int(flags | warnings)
 
     def update(
-        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None
-    ) -> int:
-        """An update with z (m); u (nu) where the sensor takes inputs; mask: bit i for component i."""
+        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None,
+        inputs: ArrayLike | Mapping[str, float] | None = None,
+    ) -> int:  # fmt: skip
+        """An update with z (m); u (nu) where the sensor takes inputs; mask: bit i for component i; inputs: the
+        sensor's own, in order or by name, where it has some."""
         model = self.sensors[sensor]
         measured = np.array(z, dtype=np.float64).reshape(model.m)
-        inputs = self._inputs(u, needed=model.takes_inputs)
-        used = _used(model, mask)
+        given = self._inputs(u, needed=model.takes_inputs)
+        own = own_inputs(model, inputs)
+        used = components_used(model, mask)
         if not used:
             return int(Status.OK)
-        reading = Reading(model, measured, used, Context(self.parameters, inputs, self._clock.now, 0.0))
+        reading = Reading(model, measured, used, Context(self.parameters, given, self._clock.now, 0.0, own))
         try:
-            self._test(self._read.update(sensor, used), inputs)
+            self._test(self._read.update(sensor, used), given, dict(zip(model.own, own.tolist(), strict=True)))
             if not np.isfinite(measured[list(used)]).all():
                 raise StepError(Status.NOT_FINITE)
             if self._initialises(reading):
@@ -229,9 +233,9 @@ class ReferenceFilter:
             return np.zeros(len(self.model.inputs))
         return np.array(u, dtype=np.float64).reshape(len(self.model.inputs))
 
-    def _test(self, read: frozenset[str], inputs: Vector) -> None:
-        """Raises NOT_FINITE for an input or a parameter that is read and is not finite."""
-        given = {**dict(zip(self.model.inputs, map(float, inputs), strict=True)), **self.parameters}
+    def _test(self, read: frozenset[str], inputs: Vector, own: Mapping[str, float] | None = None) -> None:
+        """Raises NOT_FINITE for an input or a parameter that is read and is not finite. own: a sensor's inputs."""
+        given = {**dict(zip(self.model.inputs, map(float, inputs), strict=True)), **self.parameters, **(own or {})}
         if not all(math.isfinite(value) for name, value in given.items() if name in read):
             raise StepError(Status.NOT_FINITE)
 
@@ -284,14 +288,3 @@ def _is_root(options: Filter) -> bool:
 
 def _keeps_points(options: Filter) -> bool:
     return options.sigma_points is not None and not options.sigma_points.redraw
-
-
-def _used(sensor: SensorModel, mask: int | Sequence[bool] | None) -> tuple[int, ...]:
-    """The components that a mask selects; all without one."""
-    if mask is None:
-        return tuple(range(sensor.m))
-    if not sensor.partial:
-        raise TypeError(f"sensor {sensor.name} takes no mask")
-    if isinstance(mask, int | np.integer):
-        return tuple(i for i in range(sensor.m) if int(mask) >> i & 1)
-    return tuple(i for i, bit in enumerate(mask) if bit)

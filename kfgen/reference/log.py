@@ -33,10 +33,11 @@ class Run:
 def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
     """Per row: predict, then the updates in the spec's order.
 
-    The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`) to values, NaN where there is no
-    measurement. Run-time dt: t minus the last row's t, no predict in the first row and for equal t; fixed dt:
-    one predict per row, where there is a t none for equal t. A sensor with missing components is updated with the
-    others where it is `partial`, and not at all where it is not. Raises ValueError for a missing column (all columns
+    The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`, `<sensor>.<its own input>`) to values, NaN where
+    there is no measurement. Run-time dt: t minus the last row's t, no predict in the first row and for equal t; fixed
+    dt: one predict per row, where there is a t none for equal t. A sensor with missing components is updated with the
+    others where it is `partial`, and not at all where it is not, or where one of its inputs is missing.
+    Raises ValueError for a missing column (all columns
     of a sensor may be missing).
     """
     columns = {name: np.asarray(column, dtype=np.float64) for name, column in log.items()}
@@ -50,7 +51,7 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
     inputs = np.column_stack([columns[name] for name in kf.model.inputs] or [np.zeros((rows, 0))])
     readings: dict[str, Matrix] = {}
     for sensor in kf.sensors.values():
-        names = [f"{sensor.name}.{component}" for component in sensor.components]
+        names = [f"{sensor.name}.{name}" for name in (*sensor.components, *sensor.own)]
         if any(name in columns for name in names):
             absent = np.full(rows, math.nan)
             readings[sensor.name] = np.column_stack([columns.get(name, absent) for name in names])
@@ -86,11 +87,12 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
 def _measure(kf: Replayed, name: str, z: Vector, u: Vector | None, result: Run, row: int) -> int:
     """One sensor of one row: its status, 0 where there is nothing to do."""
     sensor = kf.sensors[name]
+    z, own = np.split(z, [sensor.m])
     present = ~np.isnan(z)
-    if not np.any(present) or not (sensor.partial or np.all(present)):
+    if np.any(np.isnan(own)) or not np.any(present) or not (sensor.partial or np.all(present)):
         return 0
     mask = sum(1 << i for i in range(sensor.m) if present[i]) if sensor.partial else None
-    status = kf.update(name, z, u if sensor.takes_inputs else None, mask)
+    status = kf.update(name, z, u if sensor.takes_inputs else None, mask, own if sensor.own else None)
     if status < Status.ERROR:
         result.nis[name][row] = kf.nis
     return status

@@ -35,5 +35,6 @@ class Replayed(Protocol):
     def predict(self, u: ArrayLike | None = None, dt: float | None = None) -> int: ...
 
     def update(
-        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None
-    ) -> int: ...
+        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None,
+        inputs: ArrayLike | Mapping[str, float] | None = None,
+    ) -> int: ...  # fmt: skip

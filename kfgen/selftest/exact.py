@@ -12,6 +12,7 @@ from kfgen.ir import interpret
 from kfgen.native.values import Units, value_of
 from kfgen.selftest.record import Record
 from kfgen.selftest.track import Track
+from kfgen.spec.sensors import fields_of, readings_of
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status
 
@@ -85,12 +86,10 @@ def _step(spec: Spec, twin: Twin, u: list[int], dt: int, z: list[int], k: int) -
     """The calls of a step; all that they tell."""
     given = twin.memory.numbers
     given.update({"dt": dt, **{f"u.{each.name}": raw for each, raw in zip(spec.inputs, u, strict=True)}})
-    status, first = twin.call("predict"), 0
-    for i, sensor in enumerate(spec.measurements):
-        last = first + len(sensor.components)
+    status = twin.call("predict")
+    for i, (sensor, place) in enumerate(readings_of(spec)):
         if k % (i + 1) == 0 and status < ERROR:
-            names = [f"z.{each.name}" for each in sensor.components]
-            given.update(zip(names, z[first:last], strict=True))
+            names = [f"z.{each.name}" for each in fields_of(sensor)]
+            given.update(zip(names, z[place], strict=True))
             status |= twin.call(f"update_{sensor.name}")
-        first = last
     return status

@@ -18,6 +18,7 @@ from kfgen.reference import ReferenceFilter, reference
 from kfgen.reference.status import Status
 from kfgen.scalar_names import DOUBLE, FLOAT
 from kfgen.selftest.track import Track
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -97,12 +98,10 @@ def _statuses(spec: Spec, kf: ReferenceFilter, track: Track, k: int) -> Iterator
     u = track.u[k] if spec.inputs else None
     run_time = spec.dt is not None and spec.dt.run_time
     yield kf.predict(u=u, dt=float(track.dt[k])) if run_time else kf.predict(u=u)
-    first = 0
-    for i, sensor in enumerate(spec.measurements):
-        last = first + len(sensor.components)
+    for i, (sensor, place) in enumerate(readings_of(spec)):
         if k % (i + 1) == 0:
-            yield kf.update(sensor.name, track.z[k, first:last], u=u)
-        first = last
+            z, own = np.split(track.z[k, place], [len(sensor.components)])
+            yield kf.update(sensor.name, z, u=u, inputs=own if sensor.inputs else None)
 
 
 def _rounded(value: float, quantum: float) -> float:

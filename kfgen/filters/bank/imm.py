@@ -241,7 +241,7 @@ class Imm:
         self._store(t, runs, self.combined(t, made, mu), mu)
         fields = [mode.path("nis") for mode in self.modes]
         store_outcome(t, self.model, sensors, judged, log_likelihood, fields)
-        guards.settled(t, self.model)
+        guards.settled(t, self.model, sensors[0])
         name, doc = update_name(sensors[0], partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
 

@@ -184,7 +184,7 @@ class SingleFilter(ABC):
         assert made.nis is not None
         assert made.log_likelihood is not None
         store_outcome(t, model, [sensor], [made.nis], made.log_likelihood)
-        guards.settled(t, model)
+        guards.settled(t, model, sensor)
         name, doc = update_name(sensor, partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
 

@@ -26,6 +26,7 @@ def needed(models: Sequence[Model], sensors: Sequence[SensorModel], used: Sequen
                 found.setdefault(name, set()).add(places)
     paths = {name: f"u.{name}" for model in models for name in model.inputs}
     paths |= {name: f"kf.parameters.{name}" for model in models for name, _ in model.parameters}
+    paths |= {name: f"z.{name}" for sensor in sensors for name in sensor.inputs}
     always = frozenset[int]()
     out: dict[str, Value] = {}
     for name, path in paths.items():

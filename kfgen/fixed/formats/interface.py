@@ -46,6 +46,10 @@ class Interface:
             f.ranges.see(("number", "dt"), float(high or 0))
             self._quantity(("number", "dt"), "dt", float(high or 0), 4)
         z = {s.name: [self._component(s, k) for k in range(len(s.h))] for s in self.model.sensors}
+        for s in self.model.sensors:
+            for each in s.spec.inputs:
+                own = ("number", f"update_{s.name}", f"z.{each.name}")
+                self._quantity(own, f"{s.name}.{each.name}", self._limit(each.range), 2)
         one = -f.bits
         for b, mode in enumerate(self.code.modes):
             f.fixed[f.arrays.element(("array", "kf.mu"), b)] = one

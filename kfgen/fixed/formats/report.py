@@ -5,6 +5,7 @@ from __future__ import annotations
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.formats.formats import Formats
 from kfgen.model import Model
+from kfgen.spec.sensors import fields_of
 
 
 def units(code: FilterCode, formats: Formats) -> tuple[tuple[str, int], ...]:
@@ -15,7 +16,7 @@ def units(code: FilterCode, formats: Formats) -> tuple[tuple[str, int], ...]:
     out += [(each.name, ("number", f"kf.parameters.{each.name}")) for each in spec.parameters]
     out += [
         (f"{s.name}_{c.name}", ("number", f"update_{s.name}", f"z.{c.name}"))
-        for s in spec.measurements for c in s.components
+        for s in spec.measurements for c in fields_of(s)
     ]  # fmt: skip
     if spec.dt is not None and spec.dt.run_time:
         out.append(("dt", ("number", "dt")))

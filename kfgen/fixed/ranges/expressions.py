@@ -70,7 +70,7 @@ class ExpressionSource:
             case "counter":
                 return f"c_{node.data}"
             case "field":
-                if self.f.private and not node.data.startswith(("kf.", "u.")):
+                if self.f.private and not node.data.startswith(("kf.", "u.", "z.")):
                     return f"n_{node.data}"
                 return f"N[{node.data!r}]"
             case "element":

@@ -9,6 +9,7 @@ from kfgen.filters.base import FilterCode
 from kfgen.fixed.ranges.memory import Memory, blank
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
+from kfgen.spec.sensors import columns_of, fields_of
 from kfgen.spec.types import Sensor
 
 Columns = Mapping[str, Sequence[float]]
@@ -25,8 +26,8 @@ def elapsed(log: Columns, k: int) -> float:
 
 
 def readings(log: Columns, sensor: Sensor, k: int) -> list[float]:
-    """What a sensor's components read in row k; NaN where nothing was."""
-    columns = [log.get(f"{sensor.name}.{c.name}") for c in sensor.components]
+    """What a sensor's components read in row k, and its own inputs; NaN where nothing was."""
+    columns = [log.get(name) for name in columns_of(sensor)]
     return [math.nan if column is None else float(column[k]) for column in columns]
 
 
@@ -161,19 +162,19 @@ class Runner:
         return step != 0
 
     def _update(self, memory: Memory, sensor: Sensor, values: Sequence[float], k: int) -> None:
-        there = [not math.isnan(v) for v in values]
-        if not any(there):
+        there = [not math.isnan(v) for v in values[: len(sensor.components)]]
+        if not any(there) or any(map(math.isnan, values[len(there) :])):
             return
         self.heard.add(sensor.name)
         name = f"update_{sensor.name}"
-        for c, v, known in zip(sensor.components, values, there, strict=True):
-            memory.numbers[f"z.{c.name}"] = v if known else 0.0
-            if known:
+        for c, v in zip(fields_of(sensor), values, strict=True):
+            memory.numbers[f"z.{c.name}"] = 0.0 if math.isnan(v) else v
+            if not math.isnan(v):
                 self.ranges.see(("number", name, f"z.{c.name}"), v)
         if all(there):
             if sensor.partial:
                 other = memory.copy()
-                other.numbers["mask"] = 1 + k % ((1 << len(values)) - 1)
+                other.numbers["mask"] = 1 + k % ((1 << len(there)) - 1)
                 self.program.run(f"{name}_masked", other)
             self.program.run(name, memory)
         elif sensor.partial:
