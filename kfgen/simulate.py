@@ -34,7 +34,7 @@ from kfgen.reference.process import Process
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import StepError
 from kfgen.spec.modes import mode_specs
-from kfgen.spec.sensors import columns_of, fields_of
+from kfgen.spec.sensors import columns_of
 from kfgen.spec.tree import Expression, Number
 from kfgen.spec.types import Input, Matrix, Noise, Sensor, Spec
 
@@ -96,7 +96,7 @@ def _simulate(spec: Spec, steps: int, random: Draws, every: Mapping[str, int], g
     run_time = spec.dt is not None and spec.dt.run_time
     truth = np.empty((steps, model.n))
     given = {sensor.name: _inputs(sensor.inputs, model, steps, random) for sensor in spec.measurements}
-    readings = {sensor.name: np.full((steps, len(fields_of(sensor))), np.nan) for sensor in spec.measurements}
+    readings = {sensor.name: np.full((steps, len(sensor.fields)), np.nan) for sensor in spec.measurements}
     now = 0.0
     for k in range(steps):
         world = worlds[modes[k]]

@@ -16,8 +16,6 @@ from kfgen.filters.base import FilterCode
 from kfgen.ir.names import LIBRARY_NAMES
 from kfgen.ir.nodes import Constants, Table
 from kfgen.scalars import Scalar
-from kfgen.spec.sensors import fields_of
-from kfgen.spec.types import Sensor
 
 
 def package_version() -> str:
@@ -25,11 +23,6 @@ def package_version() -> str:
         return version("kfgen")
     except PackageNotFoundError:
         return "0"
-
-
-def _sensor(sensor: Sensor) -> SensorView:
-    fields = header.members(fields_of(sensor))
-    return SensorView(sensor.name, sensor.name.upper(), fields[: len(sensor.components)], fields)
 
 
 def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPoint | None = None) -> View:
@@ -70,8 +63,11 @@ def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPo
         cost_table=tuple(header.cost_table(maker.costs)),
         advice=code.notes,
         inputs=header.members(spec.inputs),
-        sensors=tuple(_sensor(s) for s in spec.measurements),
+        sensors=tuple(
+            SensorView(s.name, s.name.upper(), len(s.components), header.members(s.fields)) for s in spec.measurements
+        ),
         parameters=header.members(spec.parameters),
+        outputs=header.members(spec.outputs),
         modes=struct.modes(name, code.blocks),
         fields=struct.fields(name, code.blocks, bool(spec.parameters)),
         statuses=tuple(header.statuses()),

@@ -46,6 +46,7 @@ def source(spec: Spec, declared: Declarations) -> str:
         predict_dt=declared.takes("predict", "dt"),
         covariance=declared.has("get_covariance"),
         modes=len(spec.imm.modes) if spec.imm else 0,
+        outputs=[each.name for each in spec.outputs],
         compensated=spec.code.compensated,
     )
 
@@ -55,7 +56,7 @@ def _signature(name: str) -> str:
     return (
         f"void {name}_kfgen_run({name}_t *kf, size_t rows, const uint8_t *step, const {real} *dt, "
         f"const {real} *u, const uint32_t *mask, const {real} *z, {real} *x, {real} *rest, {real} *var, {real} *nis, "
-        f"{real} *mu, uint32_t *status)"
+        f"{real} *mu, {real} *out, {real} *deviation, uint8_t *told, uint32_t *status)"
     )
 
 

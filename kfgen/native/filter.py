@@ -129,6 +129,22 @@ class NativeFilter:
         return self.struct.get("get_sqrt_covariance", np.broadcast_to(self.struct.units.x[:, None], (n, n)))
 
     @property
+    def outputs(self) -> dict[str, float]:
+        """What the spec's `outputs` are at the present estimate; NaN where one is not finite."""
+        return self._told(0)
+
+    @property
+    def output_std(self) -> dict[str, float]:
+        """Their standard deviations, through the Jacobian."""
+        return self._told(1)
+
+    def _told(self, which: int) -> dict[str, float]:
+        names = [each.name for each in self.spec.outputs]
+        if not names:
+            raise AttributeError(f"filter {self.name} has no outputs; its spec has none")
+        return dict(zip(names, self.struct.outputs(names)[which].tolist(), strict=True))
+
+    @property
     def nis(self) -> float:
         """The normalised innovation squared of the last update."""
         return self.struct.number("nis")

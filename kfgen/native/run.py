@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,8 @@ class RunResult:
     t: [N] s, of the log, or step * dt. x: [N, n]. var: [N, n], the covariance's diagonal. nis: sensor -> [N],
     NaN where that sensor was not updated or its update failed. status: [N] uint32, the bits of all calls of
     the row. calls: function -> [N] uint32, its own status (0 where it was not called). mu: [N, modes] for an
-    imm, else None.
+    imm, else None. outputs, output_std: name -> [N], what the spec's `outputs` are after the row, and their standard
+    deviations; NaN where the filter refuses to tell them.
     """
 
     t: Array
@@ -39,6 +40,8 @@ class RunResult:
     status: NDArray[np.uint32]
     calls: Mapping[str, NDArray[np.uint32]]
     mu: Array | None = None
+    outputs: Mapping[str, Array] = field(default_factory=dict)
+    output_std: Mapping[str, Array] = field(default_factory=dict)
 
     def counts(self, errors: bool = True) -> dict[str, dict[Status, int]]:
         """How often each function returned each error (or warning) bit; functions without are left out."""
@@ -146,6 +149,9 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         "var": np.zeros((rows, n), scalar.dtype),
         "nis": np.zeros((rows, sensors), scalar.dtype),
         "mu": np.zeros((rows, modes), scalar.dtype),
+        "out": np.zeros((rows, len(spec.outputs)), scalar.dtype),
+        "deviation": np.zeros((rows, len(spec.outputs)), scalar.dtype),
+        "told": np.zeros(rows, np.uint8),
         "status": np.zeros((rows, sensors + 1), np.uint32),
     }
     if not scalar.representable(np.concatenate([work.u.ravel(), work.z.ravel(), work.dt])):
@@ -158,6 +164,10 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
     functions = ["predict", *(f"update_{name}" for name in units.z)]
     x = scalar.to_physical(arrays["x"], units.x)
     x[:, list(struct.compensated)] += arrays["rest"].astype(np.float64)
+    told: dict[str, dict[str, Array]] = {}
+    for kind in ("out", "deviation"):
+        numbers = np.where(arrays["told"][:, None] != 0, scalar.to_physical(arrays[kind], units.outputs), np.nan)
+        told[kind] = dict(zip((each.name for each in spec.outputs), numbers.T, strict=True))
     return RunResult(
         t=work.t,
         x=x,
@@ -168,6 +178,8 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         status=np.bitwise_or.reduce(status, axis=1),
         calls={function: status[:, i] for i, function in enumerate(functions)},
         mu=scalar.to_physical(arrays["mu"], units.one) if modes else None,
+        outputs=told["out"],
+        output_std=told["deviation"],
     )
 
 
@@ -178,7 +190,7 @@ def _call(
     progress: Callable[[int, int], None] | None,
 ) -> None:
     ffi, function = struct.ffi, getattr(struct.lib, f"{struct.name}_kfgen_run")
-    types = {"step": "uint8_t *", "mask": "uint32_t *", "status": "uint32_t *"}
+    types = {"step": "uint8_t *", "told": "uint8_t *", "mask": "uint32_t *", "status": "uint32_t *"}
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     for first in range(0, rows, CHUNK):
         count = min(CHUNK, rows - first)

@@ -17,6 +17,7 @@ from kfgen.reference.linalg import lower_root, udu
 from kfgen.reference.log import Run, replay
 from kfgen.reference.mode import ModeView
 from kfgen.reference.model import Context, Model, fixed_step
+from kfgen.reference.outputs import Outputs
 from kfgen.reference.parameters import Parameters
 from kfgen.reference.reading import Read
 from kfgen.reference.sensor import Reading
@@ -49,6 +50,7 @@ class ReferenceFilter:
         self._step = step_of(spec, self.model.number)
         self._fixed = fixed_step(spec)
         self._read = Read(spec)
+        self._outputs = Outputs(self.model)
         self.init()
 
     @property
@@ -76,6 +78,23 @@ class ReferenceFilter:
         self._require("Q", Q is not None, "adapt_Q")
         assert Q is not None
         return Q.copy()
+
+    @property
+    def outputs(self) -> dict[str, float]:
+        """The spec's outputs at x, by name."""
+        self._require("outputs", bool(self.spec.outputs), "outputs")
+        return self._outputs.values(self._estimate, self._now)
+
+    @property
+    def output_std(self) -> dict[str, float]:
+        """Their standard deviations, to first order."""
+        self._require("output_std", bool(self.spec.outputs), "outputs")
+        return self._outputs.deviations(self._estimate, self._now)
+
+    @property
+    def _now(self) -> Context:
+        step = math.nan if self._fixed is None else float(self._fixed)
+        return Context(self.parameters, np.zeros(len(self.model.inputs)), self._clock.now, step)
 
     @property
     def mu(self) -> Vector:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ class Run:
 
     x (r, n), var (r, n): the estimate and the diagonal of its covariance. nis: sensor -> (r), NaN in rows
     without an update of it (or with one that failed). status (r): the bits of the row's calls, or-ed. mu (r, B):
-    the probabilities of the modes of an imm, else None.
+    the probabilities of the modes of an imm, else None. outputs, output_std: name -> (r), of a spec with outputs.
     """
 
     x: Matrix
@@ -28,6 +28,8 @@ class Run:
     nis: dict[str, Vector]
     status: NDArray[np.int64]
     mu: Matrix | None = None
+    outputs: dict[str, Vector] = field(default_factory=dict)
+    output_std: dict[str, Vector] = field(default_factory=dict)
 
 
 def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
@@ -81,6 +83,10 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
         result.x[row], result.var[row] = kf.x, kf.P.diagonal()
         if result.mu is not None:
             result.mu[row] = kf.mu
+        if kf.spec.outputs:
+            for course, told in ((result.outputs, kf.outputs), (result.output_std, kf.output_std)):
+                for name, number in told.items():
+                    course.setdefault(name, np.zeros(rows))[row] = number
     return result
 
 

@@ -21,7 +21,6 @@ from kfgen.selftest.exact import record_exactly
 from kfgen.selftest.record import Record, record
 from kfgen.selftest.track import Track, track_of
 from kfgen.spec.constants import value
-from kfgen.spec.sensors import fields_of
 from kfgen.spec.types import Spec
 
 __all__ = ["selftest"]
@@ -82,6 +81,7 @@ class SelfTest:
     arrays: tuple[Array, ...]
     near: Nearness | None  # None: to the bit
     read: tuple[str, ...] = ()  # the inputs that a prediction reads
+    outputs: tuple[str, ...] = ()
 
 
 def selftest(spec: Spec, generated: Generated, track: Track | None = None) -> dict[str, str]:
@@ -108,7 +108,7 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
     first = 0
     for sensor in spec.measurements:
         takes_u = declared.takes(f"update_{sensor.name}", "u")
-        names = tuple(each.name for each in fields_of(sensor))
+        names = tuple(each.name for each in sensor.fields)
         read = _read(generated, f"update_{sensor.name}")
         tested = [f"z_{sensor.name}.{component.name}" for component in sensor.components]
         tested += [f"z_{sensor.name}.{own.name}" for own in sensor.inputs if f"z.{own.name}" in read]
@@ -132,6 +132,12 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
         arrays.append(_array("spread", "the largest variance of each state", largest, scalar))
     if found.variance is not None:
         arrays.append(_array("variances", "the diagonal of P after each step", found.variance.ravel(), scalar))
+    if spec.outputs:
+        arrays.append(_array("told", "the outputs after each step", found.outputs.ravel(), scalar))
+        arrays.append(_array("deviations", "their standard deviations", found.deviations.ravel(), scalar))
+        if not exact:
+            arrays.append(_array("sizes", "the largest of each output", abs(found.outputs).max(axis=0), scalar))
+            arrays.append(_array("wide", "and of their deviations", found.deviations.max(axis=0), scalar))
     kinds = [(state.name, state.period) for state in spec.states if not exact]
     periods = [
         (name, scalar.literal(Fraction(float(value(period.tree, spec)))))
@@ -144,6 +150,7 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
         "dt" in takes, found.variance is not None, tuple(periods), tuple(arrays),
         None if exact else _nearness(spec, scalar, found.tolerance),
         tuple(each.name for each in spec.inputs if f"u.{each.name}" in _read(generated, "predict")),
+        tuple(output.name for output in spec.outputs),
     )  # fmt: skip
 
 

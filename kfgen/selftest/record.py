@@ -7,7 +7,7 @@ departs from the one that is not; a self-test that fails then tells of the compi
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,8 @@ FINEST = {FLOAT: 2.0**-22, DOUBLE: 2.0**-44}
 class Record:
     """The track, x [k, n] and the diagonal of P [k, n] after each step (None where a filter keeps no covariance).
 
-    Where statuses are given, one of each step, all are raw numbers of the scalar type that must come out to the bit;
+    outputs, deviations (k, outputs): what the filter tells after each step. Where statuses are given, one of each step,
+    all are raw numbers of the scalar type that must come out to the bit;
     else tolerance says how near.
     """
 
@@ -45,6 +46,8 @@ class Record:
     tolerance: float
     initial: Array  # the diagonal of P before the first step [n]
     statuses: tuple[int, ...] | None = None
+    outputs: Array = field(default_factory=lambda: np.empty((0, 0)))
+    deviations: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 def record(spec: Spec, track: Track) -> Record:
@@ -56,6 +59,7 @@ def record(spec: Spec, track: Track) -> Record:
     n = len(spec.states)
     initial = np.zeros(n) if steady else np.diag(ref.P).copy()
     xs, variances = [], []
+    told: list[tuple[list[float], list[float]]] = []
     with np.errstate(all="ignore"):
         for k in range(len(track.dt)):
             if not _stepped(spec, ref, track, k) or not _stepped(spec, coarse, track, k, rounded=True):
@@ -63,6 +67,10 @@ def record(spec: Spec, track: Track) -> Record:
             variance = np.zeros(n) if steady else np.diag(ref.P).copy()
             if not steady and not _near(ref, coarse, variance):
                 break
+            if spec.outputs:
+                told.append((list(ref.outputs.values()), list(ref.output_std.values())))
+                if not _tells(told[-1], coarse):
+                    break
             xs.append(ref.x.copy())
             variances.append(variance)
     if not xs:
@@ -73,7 +81,14 @@ def record(spec: Spec, track: Track) -> Record:
     quantum = np.maximum(sigma * tolerance / 64, np.abs(x).max(axis=0) * FINEST[spec.scalar])
     x = np.array([[_rounded(v, q) for v, q in zip(*rows, strict=True)] for rows in zip(x, quantum, strict=True)])
     variance = np.array([[_rounded(v, abs(v) * tolerance / 64) for v in row] for row in variance])
-    return Record(track.first(len(x)), x, None if steady else variance, tolerance, initial)
+    outputs = np.array(told[: len(x)]).reshape(-1, 2, len(spec.outputs))
+    y, deviation = outputs[:, 0], outputs[:, 1]
+    fine = np.maximum(deviation * tolerance / 64, np.abs(y).max(axis=0, initial=0.0) * FINEST[spec.scalar])
+    y = np.array([[_rounded(v, q) for v, q in zip(*rows, strict=True)] for rows in zip(y, fine, strict=True)])
+    deviation = np.array([[_rounded(v, abs(v) * tolerance / 64) for v in row] for row in deviation])
+    return Record(
+        track.first(len(x)), x, None if steady else variance, tolerance, initial, None, y, deviation,
+    )  # fmt: skip
 
 
 def _near(ref: ReferenceFilter, coarse: ReferenceFilter, variance: Array) -> bool:
@@ -82,6 +97,13 @@ def _near(ref: ReferenceFilter, coarse: ReferenceFilter, variance: Array) -> boo
     allowed = TOLERANCES[FLOAT] / 8 * np.sqrt(np.maximum(variance, 0.0)) + 1e-6 * np.abs(ref.x)
     apart = np.abs(np.diag(coarse.P) - variance) > TOLERANCES[FLOAT] / 8 * variance + 1e-6 * np.max(variance)
     return not (np.any(error > allowed) or np.any(apart))
+
+
+def _tells(told: tuple[list[float], list[float]], coarse: ReferenceFilter) -> bool:
+    """Whether outputs and their deviations are finite, and no rounding has them jump."""
+    apart = np.abs(np.array(told) - [list(coarse.outputs.values()), list(coarse.output_std.values())])
+    y, deviation = map(np.abs, told)
+    return bool(np.all(apart <= TOLERANCES[FLOAT] / 8 * deviation + 1e-6 * np.array([y, deviation])))
 
 
 def _stepped(spec: Spec, kf: ReferenceFilter, track: Track, k: int, rounded: bool = False) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.simulate import simulate
-from kfgen.spec.sensors import columns_of, fields_of
+from kfgen.spec.sensors import columns_of
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -64,7 +64,7 @@ class Track:
 
 def track_of(spec: Spec) -> Track:
     """A track drawn from the model, of numbers that a float carries."""
-    n, m = len(spec.states), sum(len(fields_of(sensor)) for sensor in spec.measurements)
+    n, m = len(spec.states), sum(len(sensor.fields) for sensor in spec.measurements)
     steps = min(max(NUMBERS // (2 * n + m + len(spec.inputs)), STEPS.start), STEPS.stop - 1)
     # one row more: a run-time dt begins with the second
     log = simulate(spec, steps + 1, draws=Dice(spec.name))

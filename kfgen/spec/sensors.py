@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kfgen.spec.types import Component, Filter, Input, Sensor, Spec
+from kfgen.spec.types import Filter, Sensor, Spec
 
 
 def filter_of(chosen: Filter, sensor: Sensor) -> Filter:
@@ -14,21 +14,16 @@ def filter_of(chosen: Filter, sensor: Sensor) -> Filter:
     return replace(chosen, **sensor.own)
 
 
-def fields_of(sensor: Sensor) -> tuple[Component | Input, ...]:
-    """All numbers of a measurement, in the order of the sensor's struct: its components, then its inputs."""
-    return (*sensor.components, *sensor.inputs)
-
-
 def columns_of(sensor: Sensor) -> list[str]:
-    """The columns of a log that hold these numbers."""
-    return [f"{sensor.name}.{each.name}" for each in fields_of(sensor)]
+    """The columns of a log that hold the numbers of a measurement."""
+    return [f"{sensor.name}.{each.name}" for each in sensor.fields]
 
 
 def readings_of(spec: Spec) -> list[tuple[Sensor, slice]]:
     """Each sensor, and where its numbers stand where those of all sensors are in one row."""
     found, first = [], 0
     for sensor in spec.measurements:
-        last = first + len(fields_of(sensor))
+        last = first + len(sensor.fields)
         found.append((sensor, slice(first, last)))
         first = last
     return found

@@ -149,6 +149,7 @@ class Initialize:
     sensor: str
     states: Mapping[str, Expression]
     variance: Mapping[str, Expression] = field(default_factory=dict)
+    waits: bool = False  # one of a list: predictions and all else wait until every named sensor has come
     place: Place = NOWHERE
 
 
@@ -201,6 +202,11 @@ class Sensor:
     rotations: tuple[Rotation, ...] = ()  # components that are quaternions
     doc: str = ""
     place: Place = NOWHERE
+
+    @property
+    def fields(self) -> tuple[Component | Input, ...]:
+        """All numbers of a measurement, in the order of the sensor's struct: its components, then its inputs."""
+        return (*self.components, *self.inputs)
 
     @property
     def errors(self) -> tuple[str, ...]:

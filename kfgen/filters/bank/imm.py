@@ -66,6 +66,7 @@ class Imm:
             if sensor.spec.partial:
                 functions.append(self.update(k, taken, partial=True))
         functions += [self.state.set_state(taken), *self.covariance.functions(taken)]
+        functions += self.covariance.outputs(taken, self.scalar.smallest)
         if self.outdated:
             functions.append(self.redraw(taken))
         remarks = [f"{mode.name}: {text}" for mode in self.modes for text in mode.filter.remarks()]

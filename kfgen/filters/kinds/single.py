@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 from copy import copy
 from typing import Any, Self
 
+from kfgen.filters.algebra.linalg import Rows
+from kfgen.filters.algebra.numbers import Number
 from kfgen.filters.base import Block, FilterCode
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.frame import guards
@@ -15,6 +17,7 @@ from kfgen.filters.steps.adapt import AdaptedQ, AdaptedR
 from kfgen.filters.steps.compensation import Compensation
 from kfgen.filters.steps.covariance import CovarianceCode, get_matrix
 from kfgen.filters.steps.gate import gate, store_outcome
+from kfgen.filters.steps.outputs import outputs_function
 from kfgen.filters.steps.phases import Judged, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.state import StateCode
@@ -78,6 +81,7 @@ class SingleFilter(ABC):
             if sensor.spec.partial:
                 functions.append(self.update(sensor, taken, partial=True))
         functions += [self.state.set_state(taken), *self.covariance.functions(taken)]
+        functions += self.outputs(taken)
         for sensor in model.sensors:
             adapted = self.adapted_R(sensor)
             if adapted is not None:
@@ -187,6 +191,19 @@ class SingleFilter(ABC):
         guards.settled(t, model, sensor)
         name, doc = update_name(sensor, partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
+
+    def outputs(self, taken: frozenset[str]) -> list[Function]:
+        """What tells the outputs, where there are some."""
+        if not self.model.outputs:
+            return []
+        t = Trace(self.scalar.smallest)
+        return [outputs_function(t, self.model, lambda J: self.variances(t, J), taken)]
+
+    def variances(self, t: Trace, J: Rows) -> list[Number]:
+        """The diagonal of J P J^T (k,), J (k, n) in the spec's order."""
+        form = self.form.straight()
+        P = form.load(t)
+        return [form.variance(P, [row[i] for i in self.order]) for row in J]
 
     # ends
 

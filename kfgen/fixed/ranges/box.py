@@ -7,7 +7,6 @@ from fractions import Fraction
 
 from kfgen.fixed.ranges.declared import limits, number
 from kfgen.model import Model
-from kfgen.spec.sensors import fields_of
 from kfgen.spec.types import Range
 
 Span = tuple[float, float]
@@ -75,7 +74,7 @@ def box_of(model: Model) -> Box:
         parameters=parameters,
         readings={
             (s.name, c.name): limits(c.range, spec)
-            for s in spec.measurements for c in fields_of(s) if c.range is not None
+            for s in spec.measurements for c in s.fields if c.range is not None
         },
         dt=_steps(low, high, model),
     )  # fmt: skip

@@ -84,6 +84,8 @@ class ExpressionSource:
             case "bit":
                 path, place = node.data
                 return f"bool(N[{path!r}] >> {place} & 1)"
+            case "present":
+                return "True"
             case "finite":
                 v = self.value(node.args[0])
                 return f"(-inf < {v} < inf)"

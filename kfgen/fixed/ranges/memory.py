@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from kfgen.filters.base import FilterCode
-from kfgen.spec.sensors import fields_of
 
 
 @dataclass
@@ -30,7 +29,7 @@ def blank(code: FilterCode) -> Memory:
             memory.arrays[f"kf.{block.name}"] = [0.0] * block.size
     spec = code.model.spec
     memory.numbers |= {f"u.{each.name}": 0.0 for each in spec.inputs}
-    memory.numbers |= {f"z.{c.name}": 0.0 for sensor in spec.measurements for c in fields_of(sensor)}
+    memory.numbers |= {f"z.{c.name}": 0.0 for sensor in spec.measurements for c in sensor.fields}
     n = len(code.model.states)
     for f in code.functions:
         for a in f.arguments:

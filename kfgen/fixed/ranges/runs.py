@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from kfgen.filters.base import FilterCode
+from kfgen.filters.steps.outputs import FUNCTION
 from kfgen.fixed.ranges.memory import Memory, blank
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
-from kfgen.spec.sensors import columns_of, fields_of
+from kfgen.spec.sensors import columns_of
 from kfgen.spec.types import Sensor
 
 Columns = Mapping[str, Sequence[float]]
@@ -73,6 +74,7 @@ class Runner:
             for place, sensor in enumerate(self.spec.measurements):
                 if (k + place) % every == 0:
                     self._limited(memory, sensor, readings(log, sensor, k), k)
+            self._tell(memory)
             if every > 1 and rows - 2 * OUTAGE < 2 * k <= rows:
                 found = self.variances(memory)
                 least = [min(pair) for pair in zip(least or found, found, strict=True)]
@@ -94,6 +96,7 @@ class Runner:
         for sensor in self.spec.measurements:
             if sensor.name in readings:
                 self._limited(memory, sensor, readings[sensor.name], k)
+        self._tell(memory)
         if k % EVERY == 0:
             self._others(memory, k)
 
@@ -167,7 +170,7 @@ class Runner:
             return
         self.heard.add(sensor.name)
         name = f"update_{sensor.name}"
-        for c, v in zip(fields_of(sensor), values, strict=True):
+        for c, v in zip(sensor.fields, values, strict=True):
             memory.numbers[f"z.{c.name}"] = 0.0 if math.isnan(v) else v
             if not math.isnan(v):
                 self.ranges.see(("number", name, f"z.{c.name}"), v)
@@ -193,6 +196,11 @@ class Runner:
                 continue
             for i, value in enumerate(memory.arrays[f"kf.{block.name}"]):
                 self.ranges.see(self.program.arrays.element(key, i), value)
+
+    def _tell(self, memory: Memory) -> None:
+        """The outputs, where there are some."""
+        if FUNCTION in self.names:
+            self.program.run(FUNCTION, memory)
 
     def _others(self, memory: Memory, k: int) -> None:
         """Covariance and state out and in again, on copies."""

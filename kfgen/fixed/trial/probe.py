@@ -15,7 +15,6 @@ from kfgen.fixed.ranges.memory import Memory, blank
 from kfgen.fixed.ranges.real import RealProgram
 from kfgen.fixed.ranges.runs import Columns, elapsed, readings
 from kfgen.fixed.trial.integers import IntegerProgram
-from kfgen.spec.sensors import fields_of
 from kfgen.spec.types import Sensor
 
 SHAKEN = 2.0**-11  # of a covariance: what a format of 12 bits would lose in a step
@@ -80,7 +79,7 @@ class Probe:
 
     def read(self, sensor: Sensor, values: Sequence[float]) -> None:
         """Give a reading."""
-        for c, v in zip(fields_of(sensor), values, strict=True):
+        for c, v in zip(sensor.fields, values, strict=True):
             self.give(("number", f"update_{sensor.name}", f"z.{c.name}"), f"z.{c.name}", v)
 
     def call(self, function: str) -> None:
