@@ -81,9 +81,10 @@ class Model:
         }
         noises = [noise.name for sensor in spec.measurements for noise in sensor.noise]
         noises += [noise.name for noise in spec.noise]
-        own = ("t", "dt", Z, PREDICTED, INNOVATION)
         # what comes with measurements; two sensors may call theirs alike
         given = [entry.name for sensor in spec.measurements for entry in sensor.inputs]
+        given += [measured(sensor.name, c.name) for sensor in spec.measurements for c in sensor.components]
+        own = ("t", "dt", Z, PREDICTED, INNOVATION)
         self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, *given, *own))
         self._noise_slots = tuple(self.scope.slots[name] for name in noises)
         self._state_slots = tuple(self.scope.slots[name] for name in self.states)
@@ -180,6 +181,11 @@ class Model:
                 "check variances and covariances",
             ) from None
         return P
+
+
+def measured(sensor: str, component: str) -> str:
+    """The variable of a component in what its first measurement sets: it hides what has its name outside."""
+    return f" {sensor}.{component}"
 
 
 def wrap(x: float, period: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 
 from kfgen.filters.algebra.linalg import Rows, dot, plus, times
@@ -14,7 +15,7 @@ from kfgen.filters.steps.outputs import outputs_function
 from kfgen.geometry import heaviest
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
-from kfgen.ir.trace import Array, Value
+from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
 
 
@@ -88,6 +89,13 @@ class BankCovariance:
             "get_covariance", [CONST_KF, out], schedule(t, taken | {"x", "P"}),
             "The covariance of the combined state: the modes' own, and their spread.", returns="void",
         )  # fmt: skip
+
+    def isolate(self, t: Trace, variances: Mapping[int, Value]) -> None:
+        """As a filter by itself does, in every mode."""
+        assert isinstance(t, BankTrace)
+        for mode in self.modes:
+            with t.of(mode.scope()):
+                mode.filter.isolate(t, variances)
 
     def outputs(self, taken: frozenset[str], smallest: Fraction) -> list[Function]:
         """What tells the outputs, where there are some."""

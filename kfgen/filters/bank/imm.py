@@ -53,9 +53,8 @@ class Imm:
         fields = [field for mode in self.modes for field in mode.fields()]
         mu = Block("mu", len(self.modes), "probabilities of the modes", initial=bank.mu0)
         states = ("kf.x", *(mode.path("x") for mode in self.modes))
-        self.outdated = outdated
-        self.state = StateCode(self.model, (mu, *fields), (), outdated, states, bank.sensors)
-        self.covariance = BankCovariance(self.model, self.modes, outdated)
+        self.outdated, self.covariance = outdated, BankCovariance(self.model, self.modes, outdated)
+        self.state = StateCode(self.model, (mu, *fields), (), outdated, states, bank.sensors, self.covariance.isolate)
 
     def code(self, taken: frozenset[str]) -> FilterCode:
         """The complete filter. taken: names that locals must not have."""
@@ -130,7 +129,7 @@ class Imm:
     def predict(self, taken: frozenset[str]) -> Function:
         """All modes mixed, then each predicted; mu <- M^T mu."""
         t = BankTrace(self.scalar.smallest)
-        arguments, step = begin_predict(t, self.model)
+        arguments, step = begin_predict(t, self.model, self.state.first)
         scopes = [mode.scope() for mode in self.modes]
         mu = self._mu(t)
         t.section("probabilities after a switch, and of the mode before, given the mode now")
@@ -221,8 +220,8 @@ class Imm:
         t = BankTrace(self.scalar.smallest)
         sensors = [self._sensor(mode, k) for mode in self.modes]
         models = [mode.model.of(sensor) for mode, sensor in zip(self.modes, sensors, strict=True)]
-        arguments, used = begin_update(t, models, sensors, partial)
-        self.state.initialize(t, sensors[0], used)
+        arguments, used = begin_update(t, models, sensors, partial, self.state.first)
+        self.state.first.run(t, sensors[0], used)
         scopes = [mode.scope() for mode in self.modes]
         runs: list[tuple[Scope, Phases]] = []
         first: list[Judged | Made] = []

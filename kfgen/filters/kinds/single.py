@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from copy import copy
 from typing import Any, Self
 
@@ -58,7 +59,9 @@ class SingleFilter(ABC):
         extra = [*self.compensation.blocks(), *form.named([*extra, *self.extra_blocks()])]
         outdated = (self.outdated,) if self.outdated else ()
         self.covariance = CovarianceCode(model, form, scalar.epsilon, self.outdated)
-        self.state = StateCode(model, self.covariance.blocks(), tuple(extra), outdated)
+        self.state = StateCode(
+            model, self.covariance.blocks(), tuple(extra), outdated, isolating=self.isolate,
+        )  # fmt: skip
 
     # the steps, in phases
 
@@ -167,7 +170,7 @@ class SingleFilter(ABC):
     def predict(self, taken: frozenset[str]) -> Function:
         """x <- f(x, u, 0), P <- F P F^T + Q + G Qw G^T."""
         t = Trace(self.scalar.smallest)
-        arguments, step = begin_predict(t, self.model)
+        arguments, step = begin_predict(t, self.model, self.state.first)
         for _ in self.predicting(t, step):
             pass
         process.store_time(t, self.model, step)
@@ -178,8 +181,8 @@ class SingleFilter(ABC):
     def update(self, sensor: SensorModel, taken: frozenset[str], partial: bool = False) -> Function:
         """The update with the whole vector z of a sensor, or with the components that a mask selects."""
         model, t = self.model, Trace(self.scalar.smallest)
-        arguments, used = begin_update(t, [model.of(sensor)], [sensor], partial)
-        self.state.initialize(t, sensor, used)
+        arguments, used = begin_update(t, [model.of(sensor)], [sensor], partial, self.state.first)
+        self.state.first.run(t, sensor, used)
         for phase in self.of(sensor).updating(t, sensor, used):
             if isinstance(phase, Judged):
                 gate(t, model, [sensor], [phase.nis], used)
@@ -204,6 +207,11 @@ class SingleFilter(ABC):
         form = self.form.straight()
         P = form.load(t)
         return [form.variance(P, [row[i] for i in self.order]) for row in J]
+
+    def isolate(self, t: Trace, variances: Mapping[int, Value]) -> None:
+        """Give errors, by their places in the spec's order, variances of their own, correlated with none; stored."""
+        for i, variance in variances.items():
+            self.form.isolate(t, self.order.index(i), variance)
 
     # ends
 

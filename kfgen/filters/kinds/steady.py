@@ -13,6 +13,7 @@ from kfgen.filters.base import CONST_KF, INPUTS, KF, FilterCode, sensor_argument
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
 from kfgen.filters.steps.gate import gate, store_outcome, tested
+from kfgen.filters.steps.needed import read
 from kfgen.filters.steps.outputs import outputs_function
 from kfgen.filters.steps.sensor import SensorCode, needs_inputs, total
 from kfgen.filters.steps.state import StateCode
@@ -67,6 +68,7 @@ class Steady:
         """x <- f(x, u, 0)."""
         model, t = self.model, Trace(self.scalar.smallest)
         arguments: list[Argument] = [KF]
+        self.state.first.wait(t)
         if model.inputs:
             arguments.append(INPUTS)
         guards.arguments(t)
@@ -90,11 +92,13 @@ class Steady:
         """x <- x + K (z - h), nis by the constant S."""
         model, t = self.model, Trace(self.scalar.smallest)
         arguments: list[Argument] = [KF, sensor_argument(sensor.name)]
-        if needs_inputs(model, sensor):
+        first = self.state.first
+        first.wait(t, sensor)
+        if needs_inputs(model, sensor) or first.takes_inputs(sensor):
             arguments.append(INPUTS)
-        guards.arguments(t)
+        guards.arguments(t, first.needed(t, sensor, None, {}, read([model], [sensor])))
         tested(t, model, [sensor])
-        self.state.initialize(t, sensor, None)
+        first.run(t, sensor, None)
         t.section("innovation")
         code = SensorCode(t, model, sensor, list(range(self.n)))
         prior = code.prior()

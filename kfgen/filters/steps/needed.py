@@ -41,6 +41,12 @@ def needed(models: Sequence[Model], sensors: Sequence[SensorModel], used: Sequen
     return out
 
 
+def read(models: Sequence[Model], sensors: Sequence[SensorModel]) -> set[str]:
+    """Names that an update itself evaluates."""
+    pairs = zip(models, sensors, strict=True)
+    return {n for model, sensor in pairs for _, formulas in _formulas(model, sensor) for n in model.uses(*formulas)}
+
+
 def _formulas(model: Model, sensor: SensorModel) -> Iterable[tuple[Places, list[Any]]]:
     """What an update evaluates, and the components that have to be in use for it to count; none: always."""
     index = {w.name: k for k, w in enumerate(sensor.noises)}
