@@ -149,8 +149,9 @@ class Initialize:
     sensor: str
     states: Mapping[str, Expression]
     variance: Mapping[str, Expression] = field(default_factory=dict)
-    waits: bool = False  # one of a list: predictions and all else wait until every named sensor has come
+    let: tuple[Definition, ...] = ()  # what the expressions share, each using only those before it
     place: Place = NOWHERE
+    waits: bool = False  # one of a list: predictions and all else wait until every named sensor has come
 
 
 @dataclass(frozen=True)
