@@ -19,21 +19,24 @@ Symbolic = Any  # a SymPy expression
 class FirstModel:
     """What the first measurement of a sensor sets.
 
-    states: by name; variances: by the name of the error's coordinate. components: those that these are made of; a
-    symbol of such a name is what is measured. waits: until every named sensor has come nothing else is done.
+    states: by name; variances: by the name of the error's coordinate. definitions: what these share, each in those
+    before it. components: those that all are made of; a symbol of such a name is what is measured. waits: until every
+    named sensor has come nothing else is done. plain: states that are components, and no more.
     """
 
     sensor: str
     states: Mapping[str, Symbolic]
     variances: Mapping[str, Symbolic]
+    definitions: tuple[tuple[str, Symbolic], ...]
     components: tuple[str, ...]
     waits: bool
-    plain: bool  # states that are components, and no more
+    plain: bool
 
     def uses(self) -> set[str]:
         """Names that the formulas use, but for components."""
-        expressions = [*self.states.values(), *self.variances.values()]
-        return {s.name for e in expressions for s in e.free_symbols} - set(self.components)
+        expressions = [*self.states.values(), *self.variances.values(), *(e for _, e in self.definitions)]
+        found = {s.name for e in expressions for s in e.free_symbols}
+        return found - set(self.components) - {name for name, _ in self.definitions}
 
 
 def build_firsts(spec: Spec, names: Mapping[str, Symbolic]) -> tuple[FirstModel, ...]:
@@ -43,14 +46,16 @@ def build_firsts(spec: Spec, names: Mapping[str, Symbolic]) -> tuple[FirstModel,
     for rule in spec.initialize:
         components = {c.name: sympy.Symbol(c.name) for c in sensors[rule.sensor].components}
         known = {**names, **components}
+        definitions = []
+        for definition in rule.let:
+            definitions.append((definition.name, to_sympy(definition.value.tree, known)))
+            known[definition.name] = sympy.Symbol(definition.name)
         states = {name: to_sympy(e.tree, known) for name, e in rule.states.items()}
         variances = {name: to_sympy(e.tree, known) for name, e in rule.variance.items()}
-        used = {s.name for e in (*states.values(), *variances.values()) for s in e.free_symbols}
+        formulas = [*states.values(), *variances.values(), *(e for _, e in definitions)]
+        used = {s.name for e in formulas for s in e.free_symbols}
         plain = all(isinstance(e.tree, Name) and e.tree.name in components for e in rule.states.values())
-        out.append(
-            FirstModel(
-                rule.sensor, states, variances, tuple(name for name in components if name in used), rule.waits,
-                plain and not variances and not rule.waits,
-            )
-        )  # fmt: skip
+        own = tuple(name for name in components if name in used)
+        alone = plain and not variances and not rule.waits
+        out.append(FirstModel(rule.sensor, states, variances, tuple(definitions), own, rule.waits, alone))
     return tuple(out)

@@ -143,7 +143,7 @@ class First:
     def _set(self, t: Trace, rule: FirstModel, sensor: SensorModel, used: Sequence[Value] | None) -> None:
         """What is computed of the measurement, tested and stored."""
         model = self.model
-        lowering = self._lowering(t, sensor)
+        lowering = self._lowering(t, rule, sensor)
         wanted = [t.name(lowering(e), f"{name}_first") for name, e in rule.states.items()]
         variances = [t.name(lowering(e), f"var_{name}_first") for name, e in rule.variances.items()]
         readings = [t.field(f"z.{c.name}") for c in sensor.spec.components]
@@ -179,13 +179,16 @@ class First:
         t.store(f"kf.{DONE}", None, done)
         t.guard(true, "OK")
 
-    def _lowering(self, t: Trace, sensor: SensorModel) -> Lowering:
+    def _lowering(self, t: Trace, rule: FirstModel, sensor: SensorModel) -> Lowering:
         """Of formulas of a measurement; components hide what else has their names."""
         model = self.model
         values = {sympy.Symbol(name): t.field(f"kf.parameters.{name}") for name, _ in model.parameters}
         values |= {sympy.Symbol(name): t.field(f"u.{name}") for name in model.inputs}
         values |= {sympy.Symbol(each.name): t.field(f"z.{each.name}") for each in sensor.spec.fields}
-        return Lowering(t, values)
+        lowering = Lowering(t, values)
+        for name, value in rule.definitions:
+            lowering.memo[sympy.Symbol(name)] = t.name(lowering(value), name)
+        return lowering
 
 
 def _flag(t: Trace, name: str) -> Value:
