@@ -123,7 +123,7 @@ class Model:
         for slot, number in zip(self._state_slots, x.tolist() if isinstance(x, np.ndarray) else x, strict=True):
             environment[slot] = float(number) if isinstance(number, np.floating) else number
         environment[slots["t"]], environment[slots["dt"]] = context.t, context.dt
-        for name, entry in zip(own, context.own.tolist(), strict=True):
+        for name, entry in zip(own, context.own.tolist(), strict=bool(own)):
             environment[slots[name]] = entry
         for slot in self._noise_slots:
             environment[slot] = 0.0

@@ -56,8 +56,11 @@ class Form(Protocol[P]):
         """Store a covariance given as the upper triangle of P and of its factors (D on the diagonal, U above)."""
         ...
 
-    def isolate(self, t: Trace, place: int, variance: Value) -> None:
-        """Store for the state at an inner place a variance of its own, at least 0, and no correlations."""
+    def isolate(self, t: Trace, variances: Mapping[int, Value], in_loops: bool) -> None:
+        """Store for some states, by their inner places, variances of their own, at least 0, and no correlations.
+
+        in_loops: by a private function, where there is one for it.
+        """
         ...
 
     def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:

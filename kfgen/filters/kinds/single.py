@@ -210,8 +210,8 @@ class SingleFilter(ABC):
 
     def isolate(self, t: Trace, variances: Mapping[int, Value]) -> None:
         """Give errors, by their places in the spec's order, variances of their own, correlated with none; stored."""
-        for i, variance in variances.items():
-            self.form.isolate(t, self.order.index(i), variance)
+        inner = {self.order.index(i): variance for i, variance in variances.items()}
+        self.form.isolate(t, inner, self.scalar.uniform)
 
     # ends
 

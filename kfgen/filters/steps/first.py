@@ -149,9 +149,9 @@ class First:
         readings = [t.field(f"z.{c.name}") for c in sensor.spec.components]
         if used is not None:
             readings = [select(u, z, t.zero) for u, z in zip(used, readings, strict=True)]
-        for value in (*readings, *wanted, *variances):  # one by one: the sum of large numbers would overflow
-            if value.constant is None:
-                t.guard(~t.finite(value), "NOT_FINITE")
+        entering = {v.node: v for v in (*readings, *wanted, *variances) if v.constant is None}
+        for value in entering.values():  # one by one: the sum of large numbers would overflow
+            t.guard(~t.finite(value), "NOT_FINITE")
         guards.positive(t, [value < 0 for value in variances])
         given = dict(zip(rule.states, wanted, strict=True))
         x = self.confined(t, [given.get(name, t.zero) for name in model.states])

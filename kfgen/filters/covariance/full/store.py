@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra.numbers import select, sqrt
@@ -53,9 +53,11 @@ class FullStore:
         with t.loop("k", 0, upper_size(self.n)) as k:
             t.store("kf.P", k, P[k])
 
-    def isolate(self, t: Trace, place: int, variance: Value) -> None:
-        for i in range(self.n):
-            t.store("kf.P", upper(min(i, place), max(i, place)), variance if i == place else t.zero)
+    def isolate(self, t: Trace, variances: Mapping[int, Value], in_loops: bool) -> None:
+        for j in range(self.n):
+            for i in range(j + 1):
+                if i in variances or j in variances:
+                    t.store("kf.P", upper(i, j), variances[i] if i == j else t.zero)
 
     def root_array(self, t: Trace, tolerance: Fraction, own: Array | None = None) -> Array:
         """The columns of the lower root of P, one after another. own: an array in place of the field.
