@@ -125,6 +125,8 @@ class Shaper:
                 if rotation.block is not None:
                     blocks[rotation.errors[0]] = rotation.block
             made = self.vectors.spread(name, plain, extent, names, formulas)
+            if extent == ROTATION:
+                self.vectors.normalised(made.entries)
             if made.block is not None:
                 blocks[names[0]] = made.block
             if kind == "state":

@@ -81,6 +81,8 @@ class Here:
     def _stem(self) -> str:
         """Of the keys under which the formula stands: `f_v`, `h_mag`."""
         keys = [key for key in self.path if not key.startswith("[")]
+        if keys[0] == "initialize":
+            return f"{keys[-1]}_start"
         if "measurements" in keys:
             return f"h_{keys[keys.index('measurements') + 1]}"
         return "_".join(keys[-2:]) if keys[-2:-1] != ["let"] else keys[-1]

@@ -9,10 +9,10 @@ from typing import Any
 from kfgen.spec.constants import NotConstant, value
 from kfgen.spec.operations import NoValue, Value
 from kfgen.spec.problems import short
-from kfgen.spec.raw import Fields, Path
-from kfgen.spec.shaping.extents import MOST_PARTS, NUMBER, ROTATION, Extent, Shaped, matrix, suffixes, vector
+from kfgen.spec.raw import BAD, Fields, Path
+from kfgen.spec.shaping.extents import MOST_PARTS, NUMBER, ROTATION, Extent, Shaped, length, matrix, suffixes, vector
 from kfgen.spec.shaping.formulas import FormulaReader, Local
-from kfgen.spec.tree import Expression, Name
+from kfgen.spec.tree import Call, Expression, Name, Number
 from kfgen.spec.types import Group, Matrix
 
 _PART = re.compile(r"[A-Za-z0-9_]+\Z", re.ASCII)
@@ -116,6 +116,8 @@ class VectorReader:
         if extent == NUMBER:
             return f"{what} of {short(name)} is a number", "declare `vector: 3` for a vector, or write one number"
         listed = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+        if extent == ROTATION:
+            return f"{what} of {short(name)} is {extent}", f"write a list: {listed}"
         return f"{what} of {short(name)} is {extent}", f"write a list: {listed}; or one number for all"
 
     def spread(
@@ -148,7 +150,7 @@ class VectorReader:
             return tuple(value.parts[i * n + i] for i in range(n))
         if value.extent.kind == "matrix" and key in ("std", "root_density"):
             hint = f"a full covariance is written as `{'var' if key == 'std' else 'density'}`"
-        return self.reader.fit(value, raw.place, extent, what, hint)
+        return self.reader.fit(value, raw.place, extent, what, hint, spread=extent != ROTATION)
 
     def _pair(self, found: Declared, key: str, raw: tuple[Any, ...]) -> tuple[Any, ...]:
         if any(end is None for end in raw):
@@ -158,6 +160,17 @@ class VectorReader:
         return tuple(zip(*ends, strict=True))
 
     # --- quaternions
+
+    def normalised(self, entries: list[Fields]) -> None:
+        """The initial values of a quaternion, divided by their norm unless that is 1."""
+        parts = [entry.values.get("init") for entry in entries]
+        trees = [part.tree for part in parts if isinstance(part, Expression) and part.tree != BAD]
+        if len(trees) < 4 or sum(t.value**2 if isinstance(t, Number) else 2 for t in trees) == 1:
+            return
+        norm = length(trees)
+        for entry, part, tree in zip(entries, parts, trees, strict=True):
+            if part is not None:
+                entry.values["init"] = replace(part, tree=Call("div", (tree, norm)))
 
     def rotation(self, name: str, f: Fields) -> RawRotation:
         """A quaternion among states or components; its std or var are of the rotation error, in rad."""
