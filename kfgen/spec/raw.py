@@ -86,6 +86,11 @@ def matrix(written: Any) -> Matrix | None:
     return written
 
 
+def key_of(path: str) -> str:
+    """The last key of a path, of an entry of a list the list's."""
+    return path.rpartition(".")[2].partition("[")[0]
+
+
 def path_text(path: Path) -> str:
     """`states.px.std`, `P0[0][1]`."""
     return "".join(part if part.startswith("[") else f".{part}" for part in path).lstrip(".")

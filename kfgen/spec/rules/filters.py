@@ -21,7 +21,7 @@ def check(facts: Facts) -> None:
         chosen = model.filter
         _excluded(facts, chosen)
         _consider(facts, model)
-        if chosen.type == "kf":
+        if chosen.type == "kf" and not model.rotations:
             _linear(facts, model)
         if chosen.gain == "steady" and facts.spec.imm is None:
             _steady(facts, model)
@@ -88,7 +88,7 @@ def _consider(facts: Facts, model: Model) -> None:
     chosen = model.filter
     if len(set(chosen.consider)) < len(chosen.consider):
         facts.add(_place(chosen, "consider"), "a state stands twice in `consider`", "name each once")
-    elif model.states and set(chosen.consider) >= {state.name for state in model.states}:
+    elif model.states and set(chosen.consider) >= set(model.errors):
         facts.add(_place(chosen, "consider"), "no state is left to be estimated", "leave a state out of `consider`")
     elif facts.empty(f"{chosen.place.path}.consider"):
         facts.add(_place(chosen, "consider"), "`consider` names no state", "name a state, or remove the key")

@@ -27,8 +27,8 @@ from kfgen.spec.shaping.extents import (
 from kfgen.spec.shaping.rotations import product, unit
 from kfgen.spec.tree import Call, Tree
 
-Share = Callable[[Shaped], Shaped]
-"""Gives what is long a name, where it will be used several times."""
+Share = Callable[..., Shaped]
+"""Gives what is long a name, where it will be used several times: (value, nodes that are not long)."""
 
 
 def elementwise(op: str, a: Shaped, b: Shaped) -> Shaped:

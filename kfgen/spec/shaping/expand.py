@@ -130,9 +130,9 @@ class Expander:
                     raise ShapeError(f"`table` wants numbers in its first list, not {x.extent}", "write numbers")
         return algebra.partwise(op, args, [], self.share)
 
-    def share(self, value: Shaped) -> Shaped:
-        """With names for parts that are long, since they are about to stand several times."""
-        parts = tuple(p if count(p, _SHORT) <= _SHORT else self.names.define(p) or p for p in value.parts)
+    def share(self, value: Shaped, most: int = _SHORT) -> Shaped:
+        """With names for parts of more nodes than `most`, since they are about to stand several times."""
+        parts = tuple(p if count(p, most) <= most else self.names.define(p) or p for p in value.parts)
         return Shaped(value.extent, parts, value.suffixes)
 
 

@@ -110,6 +110,8 @@ def add(a: Tree, b: Tree) -> Tree:
 
 
 def sub(a: Tree, b: Tree) -> Tree:
+    if a == b and not isinstance(a, Call):
+        return ZERO
     return a if is_zero(b) else neg(b) if is_zero(a) else Call("sub", (a, b))
 
 

@@ -129,6 +129,8 @@ class ModelShaper:
                 if rotation.block is not None:
                     blocks[rotation.errors[0]] = rotation.block
             made = self.vectors.spread(name, plain, extent, names, ("init",))
+            if extent == ROTATION:
+                self.vectors.normalised(made.entries)
             if made.block is not None:
                 blocks[names[0]] = made.block
             for part, entry in zip(names, made.entries, strict=True):

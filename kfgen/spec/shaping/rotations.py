@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from math import isqrt
 
 from kfgen.spec.shaping.extents import (
     ONE,
@@ -30,7 +31,8 @@ from kfgen.spec.shaping.extents import (
 )
 from kfgen.spec.tree import Call, Number, Tree
 
-Share = Callable[[Shaped], Shaped]
+Share = Callable[..., Shaped]
+FEW = 4  # nodes of a number of a quaternion, which stands in all entries of R(q)
 # of 2 (1 + cos): below it two directions are opposite, and the axis of what turns one into the other is any
 _OPPOSITE = Number(Fraction(1, 10**10))
 
@@ -81,24 +83,24 @@ def conjugate(q: Shaped, share: Share) -> Shaped:
 
 def rotate(q: Shaped, v: Shaped, share: Share) -> Shaped:
     """R(q) v."""
-    q, v = share(quaternion("rotate", q)), share(three("rotate", v))
+    q, v = share(quaternion("rotate", q), FEW), share(three("rotate", v))
     return column([inner([entry(q, i, j) for j in range(3)], v.parts) for i in range(3)])
 
 
 def unrotate(q: Shaped, v: Shaped, share: Share) -> Shaped:
     """R(q)^T v."""
-    q, v = share(quaternion("unrotate", q)), share(three("unrotate", v))
+    q, v = share(quaternion("unrotate", q), FEW), share(three("unrotate", v))
     return column([inner([entry(q, j, i) for j in range(3)], v.parts) for i in range(3)])
 
 
 def rotation(q: Shaped, share: Share) -> Shaped:
-    q = share(quaternion("rotation", q))
+    q = share(quaternion("rotation", q), FEW)
     return Shaped(matrix(3, 3), tuple(entry(q, i, j) for i in range(3) for j in range(3)))
 
 
 def rotation_vector(q: Shaped, share: Share) -> Shaped:
     """The axis times the angle, 0 to pi."""
-    q = share(quaternion("rotation_vector", q))
+    q = share(quaternion("rotation_vector", q), FEW)
     return column([Call("rotation_vector", (_index(k), *q.parts)) for k in range(3)])
 
 
@@ -108,19 +110,19 @@ def from_rotation_vector(v: Shaped, share: Share) -> Shaped:
 
 
 def roll(q: Shaped, share: Share) -> Shaped:
-    q = share(quaternion("roll", q))
+    q = share(quaternion("roll", q), FEW)
     return number(Call("atan2", (entry(q, 2, 1), entry(q, 2, 2))))
 
 
 def pitch(q: Shaped, share: Share) -> Shaped:
     """By atan2: of an arc sine the argument may exceed 1 by a rounding."""
-    q = share(quaternion("pitch", q))
+    q = share(quaternion("pitch", q), FEW)
     level = Call("hypot", (entry(q, 0, 0), entry(q, 1, 0)))
     return number(Call("atan2", (neg(entry(q, 2, 0)), level)))
 
 
 def yaw(q: Shaped, share: Share) -> Shaped:
-    q = share(quaternion("yaw", q))
+    q = share(quaternion("yaw", q), FEW)
     return number(Call("atan2", (entry(q, 1, 0), entry(q, 0, 0))))
 
 
@@ -186,6 +188,11 @@ def _turned(u: Sequence[Tree], v: Sequence[Tree], axis: Sequence[Tree], share: S
 
 def unit(parts: Sequence[Tree], share: Share) -> tuple[Tree, ...]:
     """parts / their length; 0 where that is 0."""
+    if all(isinstance(p, Number) for p in parts):
+        squares = sum(p.value**2 for p in parts if isinstance(p, Number))
+        root = Fraction(isqrt(squares.numerator), isqrt(squares.denominator)) if squares else Fraction(1)
+        if root**2 == squares or not squares:
+            return tuple(Number(p.value / root) for p in parts if isinstance(p, Number))
     size = share(number(length(parts))).number
     positive = Call("gt", (size, ZERO))
     return tuple(ZERO if is_zero(p) else Call("where", (positive, Call("div", (p, size)), ZERO)) for p in parts)

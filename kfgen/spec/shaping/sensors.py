@@ -131,10 +131,13 @@ class SensorShaper:
             return NUMBER, (name,), ()
         value = self.reader.value(raw, local)
         extent = NUMBER if value.bad else value.extent
+        if value.bad:
+            self.reader.symbols.unsure.add(name)
         own = value.suffixes
         if extent.kind == "matrix":
             self.problems.add(raw.place, f"h of {short(name)} is {extent}", "write a number, a vector or a quaternion")
             extent = NUMBER
+            f.values["h"] = Expression(BAD, "", raw.place)
         if f.get("kind") == "quaternion" and extent != ROTATION and not value.bad:
             if extent.kind == "vector" and extent.rows == 4:
                 extent, own = ROTATION, ()

@@ -81,6 +81,8 @@ class Shaper:
                 continue
             value = self.reader.value(written)
             names = self.vectors.names(name, value.extent)
+            if value.bad:
+                self.symbols.unsure.add(name)
             if not (value.bad or value.unknown) or value.extent == NUMBER:
                 self._know(name, "constant", value.extent, names, (), found, raw)
             for part, expression in zip(names, value.parts, strict=True):
@@ -125,6 +127,8 @@ class Shaper:
                 if rotation.block is not None:
                     blocks[rotation.errors[0]] = rotation.block
             made = self.vectors.spread(name, plain, extent, names, formulas)
+            if extent == ROTATION:
+                self.vectors.normalised(made.entries)
             if made.block is not None:
                 blocks[names[0]] = made.block
             if kind == "state":

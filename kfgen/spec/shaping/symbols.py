@@ -22,6 +22,7 @@ class Symbols:
         self.taken = {name.upper() for name in taken}
         self.hidden: dict[Path, list[Definition]] = {}  # first keys of a path -> definitions
         self.count = 0
+        self.unsure: set[str] = set()  # names whose declaration is a mistake that has been reported
 
     def fresh(self, stem: str) -> str:
         """A name that nothing has yet."""
@@ -52,6 +53,7 @@ class Here:
 
     def value(self, name: str) -> Shaped:
         found = self.local.get(name) or self.symbols.known.get(name)
+        self.unknown = self.unknown or name in self.symbols.unsure
         if found is None:
             self.unknown = self.unknown or not self.plain(name)
             return number(Name(name))
@@ -81,6 +83,8 @@ class Here:
     def _stem(self) -> str:
         """Of the keys under which the formula stands: `f_v`, `h_mag`."""
         keys = [key for key in self.path if not key.startswith("[")]
+        if keys[0] == "initialize":
+            return f"{keys[-1]}_start"
         if "measurements" in keys:
             return f"h_{keys[keys.index('measurements') + 1]}"
         return "_".join(keys[-2:]) if keys[-2:-1] != ["let"] else keys[-1]

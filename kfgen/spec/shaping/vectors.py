@@ -9,10 +9,10 @@ from typing import Any
 from kfgen.spec.constants import NotConstant, value
 from kfgen.spec.operations import NoValue, Value
 from kfgen.spec.problems import short
-from kfgen.spec.raw import Fields, Path
-from kfgen.spec.shaping.extents import MOST_PARTS, NUMBER, ROTATION, Extent, Shaped, matrix, suffixes, vector
+from kfgen.spec.raw import BAD, Fields, Path
+from kfgen.spec.shaping.extents import MOST_PARTS, NUMBER, ROTATION, Extent, Shaped, length, matrix, suffixes, vector
 from kfgen.spec.shaping.formulas import FormulaReader, Local
-from kfgen.spec.tree import Expression, Name
+from kfgen.spec.tree import Call, Expression, Name, Number
 from kfgen.spec.types import Group, Matrix
 
 _PART = re.compile(r"[A-Za-z0-9_]+\Z", re.ASCII)
@@ -64,7 +64,10 @@ class VectorReader:
             return self._named(name, f, written)
         if isinstance(written, Expression):
             size = self._size(written)
-            return (vector(size), ()) if size is not None else (NUMBER, ())
+            if size is not None:
+                return vector(size), ()
+        if "vector" in f:
+            self.reader.symbols.unsure.add(name)
         return NUMBER, ()
 
     def _size(self, written: Expression) -> int | None:
@@ -78,6 +81,7 @@ class VectorReader:
     def _named(self, name: str, f: Fields, written: tuple[Any, ...]) -> tuple[Extent, tuple[str, ...]]:
         parts = tuple(part for part in written if part is not None)
         place = self.walker.value_place(f"{f.place.path}.vector", f.place)
+        self.reader.symbols.unsure.add(name)
         if not written:
             self.problems.add(place, "a vector without parts", "write `vector: 3`, or the names of its parts")
             return NUMBER, ()
@@ -93,6 +97,7 @@ class VectorReader:
         elif len(parts) > MOST_PARTS:
             self.problems.add(place, f"a vector has at most {MOST_PARTS} parts, not {len(parts)}", "split it")
         else:
+            self.reader.symbols.unsure.discard(name)
             return vector(len(parts)), parts
         return NUMBER, ()
 
@@ -116,6 +121,8 @@ class VectorReader:
         if extent == NUMBER:
             return f"{what} of {short(name)} is a number", "declare `vector: 3` for a vector, or write one number"
         listed = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+        if extent == ROTATION:
+            return f"{what} of {short(name)} is {extent}", f"write a list: {listed}"
         return f"{what} of {short(name)} is {extent}", f"write a list: {listed}; or one number for all"
 
     def spread(
@@ -148,7 +155,11 @@ class VectorReader:
             return tuple(value.parts[i * n + i] for i in range(n))
         if value.extent.kind == "matrix" and key in ("std", "root_density"):
             hint = f"a full covariance is written as `{'var' if key == 'std' else 'density'}`"
-        return self.reader.fit(value, raw.place, extent, what, hint)
+        value.unknown = value.unknown or found.name in self.reader.symbols.unsure
+        fitted = self.reader.fit(value, raw.place, extent, what, hint, spread=extent != ROTATION)
+        if fitted[0].tree == BAD and extent == NUMBER and key in ("init", "value"):
+            self.reader.symbols.unsure.add(found.name)
+        return fitted
 
     def _pair(self, found: Declared, key: str, raw: tuple[Any, ...]) -> tuple[Any, ...]:
         if any(end is None for end in raw):
@@ -158,6 +169,17 @@ class VectorReader:
         return tuple(zip(*ends, strict=True))
 
     # --- quaternions
+
+    def normalised(self, entries: list[Fields]) -> None:
+        """The initial values of a quaternion, divided by their norm unless that is 1."""
+        parts = [entry.values.get("init") for entry in entries]
+        trees = [part.tree for part in parts if isinstance(part, Expression) and part.tree != BAD]
+        if len(trees) < 4 or sum(t.value**2 if isinstance(t, Number) else 2 for t in trees) == 1:
+            return
+        norm = length(trees)
+        for entry, part, tree in zip(entries, parts, trees, strict=True):
+            if part is not None:
+                entry.values["init"] = replace(part, tree=Call("div", (tree, norm)))
 
     def rotation(self, name: str, f: Fields) -> RawRotation:
         """A quaternion among states or components; its std or var are of the rotation error, in rad."""
