@@ -126,7 +126,7 @@ class Steady:
                 t.store("kf.x", i, value)
         squares, logs = self._likelihood(t, gain.made, y)
         store_outcome(t, model, [sensor], [nis], (squares + logs) * Fraction(-1, 2))
-        guards.settled(t, model)
+        guards.settled(t, model, sensor)
         doc = f"Take a measurement of {sensor.name} into account."
         return Function(f"update_{sensor.name}", arguments, schedule(t, taken | {"z", "u"}), doc)
 
