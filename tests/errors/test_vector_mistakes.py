@@ -12,6 +12,7 @@ from kfgen.spec import loads
 BASE = Path(__file__).with_name("valid").joinpath("inertial.yaml").read_text()
 STAR = "z: {q: {h: q, std: [0.01, 0.01, 0.03], error: reference}}"
 Q = ", std: [0.1, 0.1, 1], error: body, reset: true"
+MAG = '{b: {h: "unrotate(q, field)",'
 H, Y = "h: yaw(q)", "measurements.heading.z.yaw.h"
 
 # what is changed into what; where the mistake is (a text in the changed line); its key; words of message and cure
@@ -110,8 +111,7 @@ MISTAKES = [
     (STAR, "z: {q: {h: q, std: 1, kind: angle}}", "kind", "measurements.star.z.q.kind",
      "whose residual is a rotation already"),
     (H, "h: yaw(q), error: body", "error", "measurements.heading.z.yaw.error", "is no quaternion, and has no `error`"),
-
-        ('{h: "unrotate(q, field)", std: 0.5}}}\n  ahrs', '{h: "unrotate(q, field)", std: 0.5, residual: "cross(z, h)"}}}\n  ahrs',
+    (MAG + " std: 0.5}}}", MAG + ' std: 0.5, residual: "cross(z, h)"}}}',
      '"cross', "measurements.mag.z.b.residual", "uses other parts of z or h than its own"),
     # initialize
     ("triad(acc,", "triad(accc,", "accc", "initialize[0].states.q", "no component of ahrs `accc`; did you mean `acc`?"),
