@@ -205,7 +205,8 @@ class Walker(Findings):
 
     def record(self, node: Node, shape: Record, path: Path) -> Fields:
         fields = Fields(self.keys.get(path_text(path)) or self.place(node, path), path)
-        if isinstance(node, Scalar) and shape.bare is not None and node.kind != "null":
+        bare = isinstance(node, Sequence) or (isinstance(node, Scalar) and node.kind != "null")
+        if bare and shape.bare is not None:  # a value alone
             key = shape.key(shape.bare)
             assert key is not None
             fields.values[shape.bare] = self.value(node, key.shape, path)
