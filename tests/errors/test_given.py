@@ -24,7 +24,7 @@ OWN = "inputs: {b: {}}, z: {z1: {h: p - b, std: 1}}"
 
 @pytest.mark.parametrize(("own", "said"), [
     ("inputs: {p: {}}, z: {z1: {h: v - p, std: 1}}", ["`p`", "a state", "another"]),
-    ("inputs: {u1: {}}, z: {z1: {h: p - u1, std: 1}}", ["`u1`", "an input", "another"]),
+    ("inputs: {u1: {}}, z: {z1: {h: p - u1, std: 1}}", ["`u1`", "already", "another"]),
     ("inputs: {s0: {}}, z: {z1: {h: p - s0, std: 1}}", ["`s0`", "a parameter", "another"]),
     ("inputs: {z1: {}}, z: {z1: {h: p - z1, std: 1}}", ["`z1`", "component"]),
     ("inputs: {b: {range: [2, 1]}}, z: {z1: {h: p - b, std: 1}}", ["[2, 1]", "order"]),
