@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from kfgen.reference.evaluate import Closure, renamed
 from kfgen.reference.model import Model, measured
 from kfgen.reference.sensor import Reading
 from kfgen.reference.status import Status, StepError
-from kfgen.spec.tree import Call, Expression, Name, Tree, names
+from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Initialize
 
 
@@ -30,20 +29,18 @@ class Rule:
         self.waits = rule.waits
         (sensor,) = [each for each in model.spec.measurements if each.name == rule.sensor]
         hidden = {component.name: measured(rule.sensor, component.name) for component in sensor.components}
+        shared = {definition.name: measured(rule.sensor, definition.name) for definition in rule.let}
         self._hidden = hidden
         formulas = [*rule.states.values(), *rule.variance.values(), *(d.value for d in rule.let)]
-        shared = {definition.name: definition.value.tree for definition in rule.let}
         used = {name for formula in formulas for name in names(formula.tree)} - set(shared)
         self.components = tuple(name for name in hidden if name in used)
         self.read = frozenset(used - set(hidden))
 
         def compiled(formula: Expression) -> Closure:
-            return model.scope.compile(renamed(inlined(formula.tree), hidden))
+            return model.scope.compile(renamed(formula.tree, {**hidden, **shared}))
 
-        def inlined(tree: Tree) -> Tree:
-            if isinstance(tree, Name) and tree.name in shared:
-                return inlined(shared[tree.name])
-            return replace(tree, args=tuple(map(inlined, tree.args))) if isinstance(tree, Call) else tree
+        slots = model.scope.slots
+        self._shared = [(slots[shared[definition.name]], compiled(definition.value)) for definition in rule.let]
 
         self._states = {name: compiled(formula) for name, formula in rule.states.items()}
         self._variances = {name: compiled(formula) for name, formula in rule.variance.items()}
@@ -60,6 +57,8 @@ class Rule:
         for component, value in zip(reading.sensor.components, reading.z.tolist(), strict=True):
             environment[model.scope.slots[self._hidden[component]]] = value
         with np.errstate(all="ignore"):
+            for slot, formula in self._shared:  # each uses only those before it
+                environment[slot] = value_of(formula(environment))
             states = {model.index[name]: value_of(f(environment)) for name, f in self._states.items()}
             variances = {model.index[name]: value_of(f(environment)) for name, f in self._variances.items()}
         if not all(map(math.isfinite, (*states.values(), *variances.values()))):
