@@ -13,7 +13,7 @@ from kfgen.reference.algorithm import Correction, Estimator
 from kfgen.reference.arguments import components_used, own_inputs
 from kfgen.reference.clock import Clock, step_of
 from kfgen.reference.dual import Matrix, Vector
-from kfgen.reference.first import Rule
+from kfgen.reference.first import Firsts
 from kfgen.reference.linalg import lower_root, udu
 from kfgen.reference.log import Run, replay
 from kfgen.reference.mode import ModeView, is_root, keeps_points
@@ -51,9 +51,7 @@ class ReferenceFilter:
         self._fixed = fixed_step(spec)
         self._read = Read(spec)
         self._outputs = Outputs(self.model)
-        self._firsts = {rule.sensor: Rule(self.model, rule) for rule in spec.initialize}
-        for rule in self._firsts.values():
-            self.sensors[rule.sensor].takes_inputs |= bool(rule.read & set(self.model.inputs))
+        self._firsts = Firsts(self.model, spec.initialize, self.sensors)
         self.init()
 
     @property
@@ -142,7 +140,7 @@ class ReferenceFilter:
         self.nis_of_modes = (0.0,) * len(self.algorithm.options)
         self.log_likelihood = 0.0
         self.gate_count = dict.fromkeys(self.sensors, 0)
-        self._awaited = set(self._firsts)
+        self._firsts.begin()
         return int(Status.OK)
 
     def set_state(self, x: ArrayLike) -> int:
@@ -201,7 +199,7 @@ class ReferenceFilter:
         inputs = self._inputs(u, needed=bool(self.model.inputs))
         if self._step.run_time and dt is None:
             raise TypeError("predict: this filter takes dt")
-        if self._waits:
+        if self._firsts.wait:
             return int(Status.OK)
         try:
             step, flags = self._step.nominal, Status.OK
@@ -231,21 +229,21 @@ class ReferenceFilter:
         given = self._inputs(u, needed=model.takes_inputs)
         own = own_inputs(model, inputs)
         used = components_used(model, mask)
-        if not used or (self._waits and sensor not in self._awaited):
+        if not used or self._firsts.hold(sensor):
             return int(Status.OK)
         reading = Reading(model, measured, used, Context(self.parameters, given, self._clock.now, 0.0, own))
         try:
-            first = self._first(reading)
+            first = self._firsts.of(reading)
             read = self._read.update(sensor, used) | (first.read if first is not None else frozenset())
             self._test(read, given, dict(zip(model.own, own.tolist(), strict=True)))
             if not np.isfinite(measured[list(used)]).all():
                 raise StepError(Status.NOT_FINITE)
             if first is not None:
                 self._estimate = first.apply(self.algorithm, self._estimate, reading)
-                self._awaited.remove(sensor)
+                self._firsts.come(sensor)
                 self.nis = 0.0
                 return int(Status.OK)
-            if self._waits:
+            if self._firsts.wait:
                 return int(Status.OK)
             with np.errstate(all="ignore"):
                 return int(self._judge(reading))
@@ -270,16 +268,6 @@ class ReferenceFilter:
         given = {**dict(zip(self.model.inputs, map(float, inputs), strict=True)), **self.parameters, **(own or {})}
         if not all(math.isfinite(value) for name, value in given.items() if name in read):
             raise StepError(Status.NOT_FINITE)
-
-    @property
-    def _waits(self) -> bool:
-        """Whether nothing is done until other sensors have come."""
-        return any(self._firsts[sensor].waits for sensor in self._awaited)
-
-    def _first(self, reading: Reading) -> Rule | None:
-        """What a reading sets, where it is the first complete one of a sensor that sets something."""
-        rule = self._firsts.get(reading.sensor.name)
-        return rule if rule and rule.sensor in self._awaited and rule.complete(reading) else None
 
     def _judge(self, reading: Reading) -> Status:
         """An update behind the gate: the whole vector, or nothing of it."""

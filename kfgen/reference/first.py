@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from kfgen.reference.algorithm import Estimate, Estimator
 from kfgen.reference.dual import Matrix, Vector, value_of
 from kfgen.reference.evaluate import Closure, renamed
 from kfgen.reference.model import Model, measured
-from kfgen.reference.sensor import Reading
+from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Initialize
@@ -80,3 +81,35 @@ class Rule:
 
         estimate = algorithm.placed(estimate, moved)
         return algorithm.respread(estimate, spread) if variances else estimate
+
+
+class Firsts:
+    """The rules of a filter, and which sensors have not come yet."""
+
+    def __init__(self, model: Model, rules: Sequence[Initialize], sensors: Mapping[str, SensorModel]) -> None:
+        self._rules = {rule.sensor: Rule(model, rule) for rule in rules}
+        for rule in self._rules.values():
+            sensors[rule.sensor].takes_inputs |= bool(rule.read & set(model.inputs))
+        self.begin()
+
+    def begin(self) -> None:
+        """All are awaited."""
+        self._awaited = set(self._rules)
+
+    @property
+    def wait(self) -> bool:
+        """Whether nothing else is done until those that are awaited have come."""
+        return any(self._rules[sensor].waits for sensor in self._awaited)
+
+    def hold(self, sensor: str) -> bool:
+        """Whether a sensor has to wait for others."""
+        return self.wait and sensor not in self._awaited
+
+    def of(self, reading: Reading) -> Rule | None:
+        """What a reading sets, where it is the first complete one of a sensor that sets something."""
+        rule = self._rules.get(reading.sensor.name)
+        return rule if rule and rule.sensor in self._awaited and rule.complete(reading) else None
+
+    def come(self, sensor: str) -> None:
+        """It has come."""
+        self._awaited.remove(sensor)

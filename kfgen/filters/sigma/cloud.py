@@ -14,7 +14,7 @@ import sympy
 from kfgen.filters.algebra.dual import Dual, Evaluator
 from kfgen.filters.algebra.linalg import Vector, plus, times
 from kfgen.filters.algebra.numbers import is_zero, select
-from kfgen.filters.base import CONST_KF, INPUTS, sensor_argument
+from kfgen.filters.base import CONST_KF, INPUTS, image_of, sensor_argument
 from kfgen.filters.sigma.points import PointSet
 from kfgen.filters.steps import process
 from kfgen.geometry.part import Part
@@ -60,11 +60,6 @@ def given_for(body: list[Statement], sensor: SensorModel | None = None) -> list[
             stack += node.args
     measured = [] if sensor is None or not sensor.inputs else [sensor_argument(sensor.name)]
     return [a for a in (CONST_KF, INPUTS, *measured, _STEP) if a.name in read]
-
-
-def image(sensor: SensorModel) -> str:
-    """The name of an array of what is measured at a point: z, where that is not the measurement itself."""
-    return "seen_z" if sensor.inputs else "z"
 
 
 def _duals(
@@ -135,7 +130,7 @@ def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], tak
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("x", n + k), name)
     evaluator = Evaluator(t, model, _duals(t, model, _state(t, model, used), noises, used, sensor))
-    name = image(sensor)
+    name = image_of(sensor)
     for i, e in enumerate(sensor.h):
         t.store(name, i, evaluator.value(e))
     point = Argument("x", "{name}_real_t", pointer=True, size=n + len(carried))

@@ -10,6 +10,7 @@ from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.factors import solved, udu
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.symmetric import Symmetric
+from kfgen.filters.base import image_of
 from kfgen.filters.covariance.base import Solving
 from kfgen.filters.covariance.noise import Given
 from kfgen.filters.frame import guards
@@ -105,7 +106,7 @@ class Seeing:
         assert self.h is not None
         t = Trace()
         x = [t.name(t.element("x", i), name) for i, name in enumerate(model.states)]
-        point, z = t.array("point", self.stride), t.array(cloud.image(sensor), m)
+        point, z = t.array("point", self.stride), t.array(image_of(sensor), m)
         store = None if points.theta == 0 else t.array("dz", len(points.rows) * m)
         call = self.h.arguments(None)
         middle = [t.zero] * n
