@@ -41,6 +41,8 @@ class Rule:
             return model.scope.compile(renamed(formula.tree, {**hidden, **shared}))
 
         slots = model.scope.slots
+        for name in shared.values():  # of a bank the model is a mode's, which knows none of them
+            slots.setdefault(name, len(slots))
         self._shared = [(slots[shared[definition.name]], compiled(definition.value)) for definition in rule.let]
 
         self._states = {name: compiled(formula) for name, formula in rule.states.items()}
