@@ -11,15 +11,16 @@ from typing import Any
 import sympy
 
 from kfgen.errors import Mistake, Place, SpecError
-from kfgen.geometry import Part, part_of
+from kfgen.geometry import Part, Rotation, Space, part_of
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
 from kfgen.model.options import INNOVATION, GateModel, Options, build_gate, build_options
+from kfgen.model.rotations import Names, Registry, RotationModel, Turned, increment, rotation_models
 from kfgen.model.start import initial_covariance
 from kfgen.model.symbolic import constants, partials, to_sympy
 from kfgen.spec.sensors import filter_of
-from kfgen.spec.tree import Expression
-from kfgen.spec.types import Filter, Matrix, Noise, Sensor, Spec
+from kfgen.spec.tree import Expression, Name
+from kfgen.spec.types import Filter, Matrix, Noise, Sensor, Spec, error_names
 
 Symbolic = Any  # a SymPy expression
 
@@ -35,7 +36,8 @@ class NoiseModel:
 
 @dataclass(frozen=True)
 class SensorModel:
-    """One sensor of m components. h: (m,), R: (m, m), noise covariance (q, q) over `noises`."""
+    """One sensor. h: of each component; R (m, m), m being the degrees of freedom of an innovation: the number of
+    components, but 3 for the four of a quaternion; noise covariance (q, q) over `noises`."""
 
     spec: Sensor
     h: tuple[Symbolic, ...]
@@ -46,25 +48,39 @@ class SensorModel:
     noise_covariance: tuple[tuple[Symbolic, ...], ...]
     gate: GateModel | None
     options: Options | None = None  # where it has some of its own
+    rotations: tuple[RotationModel, ...] = ()
 
     @property
     def name(self) -> str:
         return self.spec.name
 
     @cached_property
-    def parts(self) -> tuple[Part, ...]:
-        """The geometry of each component."""
-        return tuple(part_of(period) for period in self.periods)
+    def space(self) -> Space:
+        """The geometry of its components."""
+        return _space(self.periods, self.rotations)
+
+    @property
+    def parts(self) -> tuple[Part | Rotation, ...]:
+        return self.space.parts
 
     @property
     def dimension(self) -> int:
         """Degrees of freedom of an innovation."""
-        return sum(part.dimension for part in self.parts)
+        return self.space.dimension
+
+    @cached_property
+    def errors(self) -> tuple[str, ...]:
+        """The names of the entries of an innovation."""
+        return error_names([c.name for c in self.spec.components], self.spec.rotations)
 
 
 @dataclass(frozen=True)
 class Model:
-    """The model of a spec with n states. f: x[k+1], or dx/dt where the form is continuous."""
+    """The model of a spec with n errors of its states. f: x[k+1], or dx/dt where the form is continuous.
+
+    turns: of each rotation the rotation vector (3,) by which a step turns it on the body's side, or its rate in the
+    body's frame where the form is continuous; None: f has its four numbers.
+    """
 
     spec: Spec
     symbols: Mapping[str, Symbolic]
@@ -86,16 +102,28 @@ class Model:
     dt_limits: tuple[Fraction | None, Fraction | None] = (None, None)
     options: Options = field(default_factory=Options)
     keeps_time: bool = False  # whether something outside of the model depends on t
+    rotations: tuple[RotationModel, ...] = ()
+    turns: tuple[tuple[Symbolic, ...] | None, ...] = ()
+    turned: Mapping[str, Turned] = field(default_factory=dict)  # definitions whose derivatives are known
     _partials: dict[Symbolic, tuple[tuple[Symbolic, Symbolic], ...]] = field(default_factory=dict, repr=False)
 
     @property
     def states(self) -> tuple[str, ...]:
         return tuple(s.name for s in self.spec.states)
 
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """The error coordinates: the states, but three of each quaternion in place of its numbers."""
+        return self.spec.errors
+
     @cached_property
-    def parts(self) -> tuple[Part, ...]:
-        """The geometry of each state."""
-        return tuple(part_of(period) for period in self.periods)
+    def space(self) -> Space:
+        """The geometry of the state."""
+        return _space(self.periods, self.rotations)
+
+    @property
+    def parts(self) -> tuple[Part | Rotation, ...]:
+        return self.space.parts
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -130,7 +158,8 @@ class Model:
         return out
 
     def dynamics_expressions(self) -> list[Symbolic]:
-        return [*self.f, *(e for m in (self.Q, self.noise_covariance) for row in m for e in row)]
+        turns = [e for turn in self.turns if turn is not None for e in turn]
+        return [*self.f, *turns, *(e for m in (self.Q, self.noise_covariance) for row in m for e in row)]
 
     @property
     def every_options(self) -> tuple[Options, ...]:
@@ -152,6 +181,12 @@ class Model:
         return self.keeps_time or "t" in self.uses(*all_expressions)
 
 
+def _space(periods: tuple[Fraction | None, ...], rotations: tuple[RotationModel, ...]) -> Space:
+    first = {rotation.first: rotation.geometry for rotation in rotations}
+    others = {rotation.first + k for rotation in rotations for k in (1, 2, 3)}
+    return Space(tuple(first.get(i, part_of(period)) for i, period in enumerate(periods) if i not in others))
+
+
 def build_model(spec: Spec) -> Model:
     """The model of a validated spec.
 
@@ -163,7 +198,8 @@ def build_model(spec: Spec) -> Model:
 class _Builder:
     def __init__(self, spec: Spec) -> None:
         self.spec = spec
-        self.names: dict[str, Symbolic] = {}
+        self.registry = Registry({r.parts: r.name for r in spec.rotations})
+        self.names = Names({}, self.registry)
         self.symbols: dict[str, Symbolic] = {}
         self.mistakes: list[Mistake] = []
         self.lowering = Lowering(Trace(), {})
@@ -187,7 +223,7 @@ class _Builder:
                      *([] if fixed is not None else ["dt"])]:  # fmt: skip
             self.declare(name)
         definitions = tuple((d.name, self.tree(d.value)) for d in spec.let)
-        n = len(spec.states)
+        n = len(spec.errors)
         dynamics = spec.dynamics
         default = [self.names[s.name] if dynamics.form == "discrete" else sympy.S.Zero for s in spec.states]
         f = tuple(
@@ -196,7 +232,7 @@ class _Builder:
         )
         places = tuple(dynamics.f[s.name].place if s.name in dynamics.f else dynamics.place for s in spec.states)
         if isinstance(dynamics.Q, Mapping):
-            diagonal = [self.tree(dynamics.Q[s.name]) if s.name in dynamics.Q else sympy.S.Zero for s in spec.states]
+            diagonal = [self.tree(dynamics.Q[name]) if name in dynamics.Q else sympy.S.Zero for name in spec.errors]
             Q = tuple(tuple(diagonal[i] if i == j else sympy.S.Zero for j in range(n)) for i in range(n))
         else:
             Q = self.matrix(dynamics.Q)
@@ -206,16 +242,23 @@ class _Builder:
                 None if step.minimum is None else self.number(step.minimum),
                 None if step.maximum is None else self.number(step.maximum),
             )
+        sensors = tuple(self.sensor(s) for s in spec.measurements)
+        options = self.options(spec.filter)
+        turns = self.turns()
+        Q_noise = self.covariance(spec.noise, spec.noise_covariance)
         return Model(
             spec=spec,
-            symbols=self.symbols,
-            definitions=definitions,
+            symbols={**self.symbols, **{name: sympy.Symbol(name) for name in self.registry.values}},
+            definitions=definitions + tuple(self.registry.values.items()),
+            rotations=rotation_models(spec.rotations, [s.name for s in spec.states]),
+            turns=turns,
+            turned=self.registry.turned,
             f=f,
             f_places=places,
             noises=self.noises(spec.noise),
-            noise_covariance=self.covariance(spec.noise, spec.noise_covariance),
+            noise_covariance=Q_noise,
             Q=Q,
-            sensors=tuple(self.sensor(s) for s in spec.measurements),
+            sensors=sensors,
             x0=tuple(self.number(s.init, folded) for s in spec.states),
             P0=initial_covariance(spec, lambda e: self.number(e, folded)),
             periods=tuple(None if s.period is None else self.number(s.period) for s in spec.states),
@@ -227,13 +270,28 @@ class _Builder:
             parameters=tuple(parameters),
             dt=fixed,
             dt_limits=limits,
-            options=self.options(spec.filter),
+            options=options,
         )
 
+    def turns(self) -> tuple[tuple[Symbolic, ...] | None, ...]:
+        """How a step turns each quaternion; see Model."""
+        dynamics, out = self.spec.dynamics, list[tuple[Symbolic, ...] | None]()
+        lets = {d.name: d.value.tree for d in self.spec.let}
+        for rotation in self.spec.rotations:
+            if dynamics.form != "discrete":
+                rates = [dynamics.f.get(name) for name in rotation.errors]
+                out.append(tuple(sympy.S.Zero if e is None else self.tree(e) for e in rates))
+            elif any(name in dynamics.f for name in rotation.parts):
+                numbers = [dynamics.f[name].tree if name in dynamics.f else Name(name) for name in rotation.parts]
+                found = increment(numbers, rotation.parts, lets)
+                out.append(None if found is None else tuple(to_sympy(tree, self.names) for tree in found))
+            else:
+                out.append((sympy.S.Zero,) * 3)
+        return tuple(out)
+
     def options(self, chosen: Filter) -> Options:
-        names = {**self.names, INNOVATION.name: INNOVATION}
-        states = [s.name for s in self.spec.states]
-        return build_options(chosen, states, self.number, lambda e: self.tree(e, names))
+        names = Names({**self.names, INNOVATION.name: INNOVATION}, self.registry)
+        return build_options(chosen, list(self.spec.errors), self.number, lambda e: self.tree(e, names))
 
     # pieces ------------------------------------------------------------------------------------------
 
@@ -257,7 +315,7 @@ class _Builder:
         return tuple(tuple(self.tree(e) for e in row) for row in rows)
 
     def limits(self, values: Mapping[str, Expression]) -> tuple[Fraction | None, ...]:
-        return tuple(self.number(values[s.name]) if s.name in values else None for s in self.spec.states)
+        return tuple(self.number(values[name]) if name in values else None for name in self.spec.errors)
 
     def noises(self, noises: tuple[Noise, ...]) -> tuple[NoiseModel, ...]:
         return tuple(NoiseModel(w.name, self.names[w.name], w.density) for w in noises)
@@ -272,19 +330,23 @@ class _Builder:
     def sensor(self, sensor: Sensor) -> SensorModel:
         for noise in sensor.noise:
             self.declare(noise.name)
-        m = len(sensor.components)
+        components = [c.name for c in sensor.components]
         if sensor.R is not None:
             R = self.matrix(sensor.R)
         else:
-            variances = [sympy.S.Zero if c.variance is None else self.tree(c.variance) for c in sensor.components]
+            given = {c.name: c.variance for c in sensor.components}
+            given |= {name: v for r in sensor.rotations for name, v in zip(r.errors, r.variances, strict=True)}
+            names = error_names(components, sensor.rotations)
+            m = len(names)
+            variances = [sympy.S.Zero if (v := given[name]) is None else self.tree(v) for name in names]
             R = tuple(tuple(variances[i] if i == j else sympy.S.Zero for j in range(m)) for i in range(m))
         residuals: list[Symbolic | None] = []
         for c in sensor.components:
             if c.residual is None:
                 residuals.append(None)
                 continue
-            names = {**self.names, "z": sympy.Symbol(f"z_{c.name}"), "h": sympy.Symbol(f"h_{c.name}")}
-            residuals.append(self.tree(c.residual, names))
+            own = {"z": sympy.Symbol(f"z_{c.name}"), "h": sympy.Symbol(f"h_{c.name}")}
+            residuals.append(self.tree(c.residual, Names({**self.names, **own}, self.registry)))
         return SensorModel(
             spec=sensor,
             h=tuple(self.tree(c.h) for c in sensor.components),
@@ -295,4 +357,5 @@ class _Builder:
             noise_covariance=self.covariance(sensor.noise, sensor.noise_covariance),
             gate=build_gate(sensor.gate, self.number, self.tree),
             options=self.options(filter_of(self.spec.filter, sensor)) if sensor.own else None,
+            rotations=rotation_models(sensor.rotations, components),
         )

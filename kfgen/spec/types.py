@@ -7,7 +7,7 @@ substitutes `Spec.constants` exactly.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -319,3 +319,16 @@ class Spec:
     advice: tuple[str, ...] = ()  # names of the advice that is not wanted
     place: Place = NOWHERE
     places: Mapping[str, Place] = field(default_factory=dict)  # of the top-level keys that were written
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """The error coordinates, in order: a state's own name, the three errors of a quaternion in place of its four
+        numbers."""
+        return error_names([state.name for state in self.states], self.rotations)
+
+
+def error_names(numbers: Iterable[str], rotations: Iterable[Rotation]) -> tuple[str, ...]:
+    """The error coordinates of states or components."""
+    first = {rotation.parts[0]: rotation.errors for rotation in rotations}
+    others = {part for rotation in rotations for part in rotation.parts[1:]}
+    return tuple(e for name in numbers if name not in others for e in first.get(name, (name,)))

@@ -128,7 +128,7 @@ class Imm:
 
     def predict(self, taken: frozenset[str]) -> Function:
         """All modes mixed, then each predicted; mu <- M^T mu."""
-        t = BankTrace(self.scalar.smallest)
+        t = BankTrace(self.scalar.smallest, self.scalar.epsilon)
         arguments, step = begin_predict(t, self.model)
         scopes = [mode.scope() for mode in self.modes]
         mu = self._mu(t)
@@ -217,7 +217,7 @@ class Imm:
 
     def update(self, k: int, taken: frozenset[str], partial: bool = False) -> Function:
         """Each mode updated; mu_j <- mu_j exp(l_j), normalised."""
-        t = BankTrace(self.scalar.smallest)
+        t = BankTrace(self.scalar.smallest, self.scalar.epsilon)
         sensors = [self._sensor(mode, k) for mode in self.modes]
         models = [mode.model.of(sensor) for mode, sensor in zip(self.modes, sensors, strict=True)]
         arguments, used = begin_update(t, models, sensors, partial)

@@ -7,7 +7,7 @@ update: see `sequence`. The filters that linearise otherwise are subclasses: iek
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +26,7 @@ from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.process import Advance, Prior, Step
 from kfgen.filters.steps.sensor import Innovation, Linearised, SensorCode, decorrelated, masked, total
 from kfgen.filters.steps.sequence import Sequence, Updated, departs
+from kfgen.geometry import Turn
 from kfgen.ir.trace import Trace, Value
 from kfgen.model.model import SensorModel
 
@@ -46,6 +47,7 @@ class Update:
     adapted: AdaptedR | None
     tested: list[Value] = field(default_factory=list)  # what else has to be finite
     rests: Rests = field(default_factory=dict)  # of compensated states, after the update
+    turns: list[Turn] = field(default_factory=list)  # of the rotations, by the update
     free: list[Value] = field(default_factory=list)  # x after the update, before bounds
 
     @cached_property
@@ -125,6 +127,8 @@ class Ekf(SingleFilter):
         result = self.sequence(u, innovation, plain=True)
         final = yield from self.final(u, innovation, result)
         x = self.moved(u, final.motion)
+        if u.turns:
+            final = replace(final, P=self.reset(u, final.P))
         inflates = self.model.options.inflation is not None and not self.form.factored
         evidence = self.unconfined(x) + self.form.evidence(final.P, after_predict=inflates)
         P = self.limited(t, final.P)
@@ -196,7 +200,7 @@ class Ekf(SingleFilter):
 
     def sequence(self, u: Update, innovation: Innovation, plain: bool) -> Updated[Any]:
         """The components one by one. plain: the textbook's update."""
-        names = [c.name for c in u.sensor.spec.components]
+        names = list(u.sensor.errors)
         return Sequence(u.t, self.model, self.form, names, plain, self.scalar.epsilon).run(u.P, innovation)
 
     def judged(self, u: Update, innovation: Innovation, plain: Updated[Any]) -> Phases:
@@ -250,11 +254,46 @@ class Ekf(SingleFilter):
 
     def moved(self, u: Update, motion: Motion) -> list[Value]:
         """x after the update, in the spec's order, before bounds and wrapping."""
+        if self.model.rotations:
+            return self.retracted(u, motion)
         x = motion.state(u.x, self.model.states, self.covariance.place)
         dx = motion.entries() if self.compensation.states else []
         steps = {i: u.t.value(dx[self.order.index(i)]) for i in self.compensation.states}
         compensated, u.rests = self.compensation.moved(u.t, u.x, steps)
         return [compensated[i] if i in u.rests else value for i, value in enumerate(x)]
+
+    def retracted(self, u: Update, motion: Motion) -> list[Value]:
+        """x [+] d. The turns of the rotations are kept for the reset."""
+        t, model = u.t, self.model
+        d = [t.zero] * len(self.order)
+        for place, m in zip(self.order, motion.entries(), strict=True):
+            d[place] = t.value(m)
+        u.turns = [Turn([t.name(d[r.first_error + k], f"d_{r.errors[k]}") for k in range(3)]) for r in model.rotations]
+        x = list(u.x)
+        for i, j, _ in model.space.singles:
+            x[i] = t.name(t.value(plus(x[i], d[j])), f"{model.states[i]}_next")
+        for r, turn in zip(model.rotations, u.turns, strict=True):
+            new = r.geometry.turned(x[r.first : r.first + 4], turn)
+            x[r.first : r.first + 4] = [t.name(a, f"{part}_next") for a, part in zip(new, r.parts, strict=True)]
+        steps = {i: d[k] for i in self.compensation.states if (k := model.space.errors_of[i]) is not None}
+        compensated, u.rests = self.compensation.moved(t, u.x, steps)
+        return [compensated[i] if i in u.rests else value for i, value in enumerate(x)]
+
+    def reset(self, u: Update, P: Any) -> Any:
+        """P of the errors as they are seen from the new attitudes: T P T^T."""
+        t, model, n = u.t, self.model, len(self.order)
+        moving = [(r, turn) for r, turn in zip(model.rotations, u.turns, strict=True) if r.reset]
+        if not moving:
+            return P
+        t.section("reset: the errors as seen from the new attitude")
+        T = [[t.one if i == j else t.zero for j in range(n)] for i in range(n)]
+        for r, turn in moving:
+            block = r.geometry.moved(turn)
+            for i in range(3):
+                for j in range(3):
+                    T[r.first_error + i][r.first_error + j] = t.value(block[i][j])
+        inner = [[T[i][j] for j in self.order] for i in self.order]
+        return self.form.predict(t, P, inner, Given([[t.zero] * n for _ in range(n)]), [])
 
 
 FILTERS = {"kf": Ekf, "ekf": Ekf}

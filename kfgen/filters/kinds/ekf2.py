@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from kfgen.filters.algebra.dual import Dual, Evaluator, Hessian
+from kfgen.filters.algebra.dual import Dual, Evaluator
+from kfgen.filters.algebra.gradient import Hessian
 from kfgen.filters.algebra.linalg import Rows, plus, times
 from kfgen.filters.algebra.numbers import Number, is_nonnegative, is_zero
 from kfgen.filters.algebra.symmetric import Symmetric
