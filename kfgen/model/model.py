@@ -225,9 +225,11 @@ class _Builder:
         definitions = tuple((d.name, self.tree(d.value)) for d in spec.let)
         n = len(spec.errors)
         dynamics = spec.dynamics
+        turns = self.turns()
+        turning = {part for r, turn in zip(spec.rotations, turns, strict=True) if turn is not None for part in r.parts}
         default = [self.names[s.name] if dynamics.form == "discrete" else sympy.S.Zero for s in spec.states]
         f = tuple(
-            self.tree(dynamics.f[s.name]) if s.name in dynamics.f else d
+            self.tree(dynamics.f[s.name]) if s.name in dynamics.f and s.name not in turning else d
             for s, d in zip(spec.states, default, strict=True)
         )
         places = tuple(dynamics.f[s.name].place if s.name in dynamics.f else dynamics.place for s in spec.states)
@@ -244,7 +246,6 @@ class _Builder:
             )
         sensors = tuple(self.sensor(s) for s in spec.measurements)
         options = self.options(spec.filter)
-        turns = self.turns()
         Q_noise = self.covariance(spec.noise, spec.noise_covariance)
         return Model(
             spec=spec,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from kfgen.filters.algebra.linalg import Vector, dot, plus
+from kfgen.filters.algebra.linalg import Rows, Vector, dot, plus
 from kfgen.filters.algebra.numbers import assume_positive, is_positive, positive_within, require_nonnegative
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Form
@@ -29,6 +29,7 @@ from kfgen.filters.steps.sequence import Sequence, Updated, departs
 from kfgen.geometry import Turn
 from kfgen.ir.trace import Trace, Value
 from kfgen.model.model import SensorModel
+from kfgen.model.rotations import RotationModel
 
 Final = Generator[Judged | Made, None, Updated[Any]]
 """Yields as Phases do, and returns the update that is made."""
@@ -48,6 +49,8 @@ class Update:
     tested: list[Value] = field(default_factory=list)  # what else has to be finite
     rests: Rests = field(default_factory=dict)  # of compensated states, after the update
     turns: list[Turn] = field(default_factory=list)  # of the rotations, by the update
+    base: list[Value] | None = None  # the state about which the rotations are turned, if it is not x
+    apart: list[Value] | None = None  # base [-] x
     free: list[Value] = field(default_factory=list)  # x after the update, before bounds
 
     @cached_property
@@ -198,10 +201,10 @@ class Ekf(SingleFilter):
             return plain
         return self.sequence(u, innovation, plain=False)
 
-    def sequence(self, u: Update, innovation: Innovation, plain: bool) -> Updated[Any]:
-        """The components one by one. plain: the textbook's update."""
+    def sequence(self, u: Update, innovation: Innovation, plain: bool, P: Any = None) -> Updated[Any]:
+        """The components one by one. plain: the textbook's update. P: in place of that of the struct."""
         names = list(u.sensor.errors)
-        return Sequence(u.t, self.model, self.form, names, plain, self.scalar.epsilon).run(u.P, innovation)
+        return Sequence(u.t, self.model, self.form, names, plain, self.scalar.epsilon).run(u.P if P is None else P, innovation)
 
     def judged(self, u: Update, innovation: Innovation, plain: Updated[Any]) -> Phases:
         """Guards, and then the gate, over the textbook's update. A far outlier may overflow nis and is gated all the
@@ -265,11 +268,16 @@ class Ekf(SingleFilter):
     def retracted(self, u: Update, motion: Motion) -> list[Value]:
         """x [+] d. The turns of the rotations are kept for the reset."""
         t, model = u.t, self.model
-        d = [t.zero] * len(self.order)
-        for place, m in zip(self.order, motion.entries(), strict=True):
-            d[place] = t.value(m)
-        u.turns = [Turn([t.name(d[r.first_error + k], f"d_{r.errors[k]}") for k in range(3)]) for r in model.rotations]
+        d = self.by_error(t, motion)
         x = list(u.x)
+        turns = []
+        for r in model.rotations:
+            by, first = d[r.first_error : r.first_error + 3], r.first_error
+            if u.base is not None and u.apart is not None:
+                x[r.first : r.first + 4] = u.base[r.first : r.first + 4]
+                by = [a - b for a, b in zip(by, u.apart[first : first + 3], strict=True)]
+            turns.append(Turn([t.name(a, f"d_{name}") for a, name in zip(by, r.errors, strict=True)]))
+        u.turns = turns
         for i, j, _ in model.space.singles:
             x[i] = t.name(t.value(plus(x[i], d[j])), f"{model.states[i]}_next")
         for r, turn in zip(model.rotations, u.turns, strict=True):
@@ -279,21 +287,31 @@ class Ekf(SingleFilter):
         compensated, u.rests = self.compensation.moved(t, u.x, steps)
         return [compensated[i] if i in u.rests else value for i, value in enumerate(x)]
 
+    def by_error(self, t: Trace, motion: Motion) -> list[Value]:
+        """By what an update moves, in the spec's order."""
+        d = [t.zero] * len(self.order)
+        for place, m in zip(self.order, motion.entries(), strict=True):
+            d[place] = t.value(m)
+        return d
+
     def reset(self, u: Update, P: Any) -> Any:
         """P of the errors as they are seen from the new attitudes: T P T^T."""
-        t, model, n = u.t, self.model, len(self.order)
-        moving = [(r, turn) for r, turn in zip(model.rotations, u.turns, strict=True) if r.reset]
+        moving = [(r, turn) for r, turn in zip(self.model.rotations, u.turns, strict=True) if r.reset]
         if not moving:
             return P
-        t.section("reset: the errors as seen from the new attitude")
+        u.t.section("reset: the errors as seen from the new attitude")
+        return self.form.turned(u.t, P, self.moving(u.t, moving))
+
+    def moving(self, t: Trace, turns: list[tuple[RotationModel, Turn]]) -> Rows:
+        """T (n, n) in the inner order: how errors are seen from where rotations have been turned to."""
+        n = len(self.order)
         T = [[t.one if i == j else t.zero for j in range(n)] for i in range(n)]
-        for r, turn in moving:
+        for r, turn in turns:
             block = r.geometry.moved(turn)
             for i in range(3):
                 for j in range(3):
                     T[r.first_error + i][r.first_error + j] = t.value(block[i][j])
-        inner = [[T[i][j] for j in self.order] for i in self.order]
-        return self.form.predict(t, P, inner, Given([[t.zero] * n for _ in range(n)]), [])
+        return [[T[i][j] for j in self.order] for i in self.order]
 
 
 FILTERS = {"kf": Ekf, "ekf": Ekf}

@@ -10,6 +10,7 @@ from kfgen.filters.algebra.numbers import is_zero
 from kfgen.filters.kinds.ekf import Ekf, Final, Update
 from kfgen.filters.steps.sensor import Innovation
 from kfgen.filters.steps.sequence import Updated
+from kfgen.geometry import Turn
 
 
 class Iekf(Ekf):
@@ -28,8 +29,37 @@ class Iekf(Ekf):
         result = self.made(u, innovation, plain)
         for k in range(2, iterations + 1):
             u.t.section(f"linearisation {k} of {iterations}")
-            result = self._step(u, result)
+            result = self._turned_step(u, result) if self.model.rotations else self._step(u, result)
         return result
+
+    def reset(self, u: Update, P: Any) -> Any:
+        """P is about the last linearisation already."""
+        return P
+
+    def _turned_step(self, u: Update, before: Updated[Any]) -> Updated[Any]:
+        """The update about x_i with P_i = J^-1 P^- J^-T, J^-1 = T(e_i), e_i = x_i [-] x^- (He, Xu & Zhang 2021):
+        d_i = K_i (y_i + H_i e_i) - e_i, since J^-1 e_i = e_i."""
+        t, model = u.t, self.model
+        x = self.retracted(u, before.motion)
+        apart = self.by_error(t, before.motion)
+        P = u.P
+        turns = []
+        for r in model.rotations:
+            part = slice(r.first, r.first + 4)
+            x[part] = [t.name(a, f"{name}_iterate") for a, name in zip(x[part], r.parts, strict=True)]
+            e = [t.name(t.value(a), f"e_{name}")
+                 for a, name in zip(r.geometry.local(x[part], u.x[part]), r.errors, strict=True)]  # fmt: skip
+            apart[r.first_error : r.first_error + 3] = e
+            turns.append(Turn(e))
+        for i, j, part in model.space.singles:
+            if not part.flat:
+                x[i] = part.placed(x[i])
+                apart[j] = part.local(x[i], u.x[i])
+        u.base, u.apart = x, apart
+        P = self.form.turned(t, P, self.moving(t, list(zip(model.rotations, turns, strict=True))))
+        linear = self.compensation.corrected(t, u.code.linearise(x), self.order, u.rests)
+        y = [t.value(plus(v, dot(h, [apart[i] for i in self.order]))) for v, h in zip(linear.y, linear.H, strict=True)]
+        return self.sequence(u, self.innovation(u, replace(linear, y=y)), plain=False, P=P)
 
     def _step(self, u: Update, before: Updated[Any]) -> Updated[Any]:
         """The linear update about x^- + before.moved."""

@@ -20,7 +20,7 @@ from kfgen.filters.covariance.full.updates import Updates
 from kfgen.filters.covariance.loops.looped import Looped, Looping
 from kfgen.filters.covariance.loops.motion import ArrayGain, Displacement
 from kfgen.filters.covariance.loops.space import Space, fill
-from kfgen.filters.covariance.noise import Additive
+from kfgen.filters.covariance.noise import Additive, Given
 from kfgen.filters.covariance.parts import Gathering, Part, Removal, Scalar
 from kfgen.filters.frame.runs import put
 from kfgen.ir.trace import Array, Trace, Value
@@ -86,6 +86,10 @@ class LoopedFull(Looped, FullStore):
         self, t: Trace, P: ArrayEntries, measurements: list[Scalar], motion: Displacement
     ) -> tuple[ArrayEntries, list[ArrayGain]]:
         return self.updates.update(t, P, measurements, motion)
+
+    def turned(self, t: Trace, P: ArrayEntries, T: Rows) -> ArrayEntries:
+        before = P.written() if P.terms else P
+        return self.predict(t, before, T, Given([[t.zero] * self.n for _ in T]), []).written()
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         t, n = moved.space.t, self.n

@@ -66,6 +66,14 @@ class Absorber:
         unit: Vector = [t.one, *[t.zero] * (n - 1)]
         self._all_columns(space, False, unit, column_of, weight, lambda start: None, lambda k: 2 * k + (2 + n % 2))
 
+    def turn(
+        self, space: Space, T: Rows, column_of: Callable[[Value, Put], None], weight: Callable[[int | Value], Value]
+    ) -> None:
+        """+ sum of weight_k (T c_k)(T c_k)^T, columns as of `run`."""
+        n, t, w = self.n, space.t, self.columns(space)
+        self._all_columns(space, False, [row[0] for row in T], column_of, weight,
+                          lambda start: self._transition(t, T, w, start), lambda pair: integer(t, n))
+
     def _all_columns(
         self, space: Space, sure: bool, first: Vector, column_of: Callable[[Value, Put], None],
         weight: Callable[[int | Value], Value], change: Callable[[Value], None], reach: Callable[[Value], Value],
