@@ -22,9 +22,12 @@ HALF = Fraction(1, 2)
 
 
 class Attitude:
-    """q (4,) and the gradient of its error (3,). name: for the locals."""
+    """q (4,) and the gradient of its error (3,). name: for the locals. held: nothing turns it."""
 
-    def __init__(self, t: Trace, name: str, geometry: Rotation, q: Sequence[Value], error: Sequence[Gradient]) -> None:
+    def __init__(
+        self, t: Trace, name: str, geometry: Rotation, q: Sequence[Value], error: Sequence[Gradient], held: bool = False
+    ) -> None:
+        self.held = held
         self.t = t
         self.name = name
         self.geometry = geometry
@@ -106,7 +109,7 @@ class Attitude:
     def by(self, phi: Three, bound: Fraction | None, names: Sequence[str] = ()) -> Attitude:
         """q exp(phi), normalised."""
         t = self.t
-        if all(is_zero(d.value) and not d.gradient for d in phi):
+        if self.held or all(is_zero(d.value) and not d.gradient for d in phi):
             return self
         turn = Turn([d.value for d in phi], bound)
         q = [t.value(a) for a in self.geometry.placed(product(self.q, turn.quaternion()))]

@@ -14,7 +14,7 @@ from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 
-__all__ = ["Attitude", "Dual", "Evaluator", "Gradient", "seeds", "state_seeds", "state_values"]
+__all__ = ["Attitude", "Dual", "Evaluator", "Gradient", "attitudes", "held_attitudes", "seeds", "state_seeds", "state_values"]
 
 class Evaluator:
     """Evaluates expressions of a model at given duals; definitions are evaluated when first needed.
@@ -31,7 +31,7 @@ class Evaluator:
         for name, dual in given.items():
             self._bind(name, dual)
         self._definitions = dict(model.definitions)
-        self.attitudes = _attitudes(trace, model, self.duals)
+        self.attitudes = attitudes(trace, model, self.duals)
 
     def _bind(self, name: str, dual: Dual) -> None:
         self.duals[name] = dual
@@ -117,12 +117,21 @@ def state_seeds(t: Trace, model: Model, x: Sequence[Value]) -> dict[str, Dual]:
     return out
 
 
+def held_attitudes(t: Trace, model: Model) -> dict[str, Dual]:
+    """The quaternions as constants of a step."""
+    out: dict[str, Dual] = {}
+    for r in model.rotations:
+        q = [t.field(f"attitude.{part}") for part in r.parts]
+        out.update(zip(r.parts, Attitude(t, r.name, r.geometry, q, [{}, {}, {}], held=True).numbers(), strict=True))
+    return out
+
+
 def state_values(model: Model, x: Sequence[Value]) -> dict[str, Dual]:
     """The states without derivatives."""
     return {name: Dual(value) for name, value in zip(model.states, x, strict=True)}
 
 
-def _attitudes(t: Trace, model: Model, duals: Mapping[str, Dual]) -> dict[str, Attitude]:
+def attitudes(t: Trace, model: Model, duals: Mapping[str, Dual]) -> dict[str, Attitude]:
     """The quaternions whose four numbers are given: as rotations, or without derivatives."""
     found = {}
     for r in model.rotations:

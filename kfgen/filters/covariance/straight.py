@@ -10,7 +10,7 @@ from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.motion import Moved
-from kfgen.filters.covariance.noise import Additive, Given
+from kfgen.filters.covariance.noise import Additive
 from kfgen.ir.trace import Trace, Value
 
 
@@ -33,8 +33,8 @@ class StraightLine(ABC):
     def kept(self, t: Trace, x: list[Value], before: list[Value]) -> list[Value]:
         return x
 
-    def turned(self, t: Trace, P: Any, T: Rows) -> Any:
-        return self.predict(t, P, T, Given([[t.zero] * len(T) for _ in T]), [])
+    def turned(self, t: Trace, P: Any, T: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Any:
+        return self.predict(t, P, T, Q, noise)
 
     @abstractmethod
     def predict(self, t: Trace, P: Any, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Any:

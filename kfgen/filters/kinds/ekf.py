@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from kfgen.filters.algebra.linalg import Rows, Vector, dot, plus
+from kfgen.filters.algebra.linalg import Vector, dot, plus
 from kfgen.filters.algebra.numbers import assume_positive, is_positive, positive_within, require_nonnegative
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Form
@@ -24,12 +24,12 @@ from kfgen.filters.steps.adapt import AdaptedR
 from kfgen.filters.steps.compensation import Rests
 from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.process import Advance, Prior, Step
+from kfgen.filters.steps.resetting import moving
 from kfgen.filters.steps.sensor import Innovation, Linearised, SensorCode, decorrelated, masked, total
 from kfgen.filters.steps.sequence import Sequence, Updated, departs
 from kfgen.geometry import Turn
 from kfgen.ir.trace import Trace, Value
 from kfgen.model.model import SensorModel
-from kfgen.model.rotations import RotationModel
 
 Final = Generator[Judged | Made, None, Updated[Any]]
 """Yields as Phases do, and returns the update that is made."""
@@ -294,24 +294,17 @@ class Ekf(SingleFilter):
             d[place] = t.value(m)
         return d
 
+    def nothing(self, t: Trace) -> Additive:
+        """No noise."""
+        return Given([[t.zero] * len(self.order) for _ in self.order])
+
     def reset(self, u: Update, P: Any) -> Any:
         """P of the errors as they are seen from the new attitudes: T P T^T."""
-        moving = [(r, turn) for r, turn in zip(self.model.rotations, u.turns, strict=True) if r.reset]
-        if not moving:
+        turned = [(r, turn) for r, turn in zip(self.model.rotations, u.turns, strict=True) if r.reset]
+        if not turned:
             return P
         u.t.section("reset: the errors as seen from the new attitude")
-        return self.form.turned(u.t, P, self.moving(u.t, moving))
-
-    def moving(self, t: Trace, turns: list[tuple[RotationModel, Turn]]) -> Rows:
-        """T (n, n) in the inner order: how errors are seen from where rotations have been turned to."""
-        n = len(self.order)
-        T = [[t.one if i == j else t.zero for j in range(n)] for i in range(n)]
-        for r, turn in turns:
-            block = r.geometry.moved(turn)
-            for i in range(3):
-                for j in range(3):
-                    T[r.first_error + i][r.first_error + j] = t.value(block[i][j])
-        return [[T[i][j] for j in self.order] for i in self.order]
+        return self.form.turned(u.t, P, moving(u.t, self.model, self.order, turned), self.nothing(u.t), [])
 
 
 FILTERS = {"kf": Ekf, "ekf": Ekf}

@@ -8,6 +8,7 @@ from typing import Any
 from kfgen.filters.algebra.linalg import dot, plus
 from kfgen.filters.algebra.numbers import is_zero
 from kfgen.filters.kinds.ekf import Ekf, Final, Update
+from kfgen.filters.steps.resetting import moving
 from kfgen.filters.steps.sensor import Innovation
 from kfgen.filters.steps.sequence import Updated
 from kfgen.geometry import Turn
@@ -45,10 +46,10 @@ class Iekf(Ekf):
         P = u.P
         turns = []
         for r in model.rotations:
-            part = slice(r.first, r.first + 4)
-            x[part] = [t.name(a, f"{name}_iterate") for a, name in zip(x[part], r.parts, strict=True)]
+            own = slice(r.first, r.first + 4)
+            x[own] = [t.name(a, f"{name}_iterate") for a, name in zip(x[own], r.parts, strict=True)]
             e = [t.name(t.value(a), f"e_{name}")
-                 for a, name in zip(r.geometry.local(x[part], u.x[part]), r.errors, strict=True)]  # fmt: skip
+                 for a, name in zip(r.geometry.local(x[own], u.x[own]), r.errors, strict=True)]  # fmt: skip
             apart[r.first_error : r.first_error + 3] = e
             turns.append(Turn(e))
         for i, j, part in model.space.singles:
@@ -56,7 +57,8 @@ class Iekf(Ekf):
                 x[i] = part.placed(x[i])
                 apart[j] = part.local(x[i], u.x[i])
         u.base, u.apart = x, apart
-        P = self.form.turned(t, P, self.moving(t, list(zip(model.rotations, turns, strict=True))))
+        T = moving(t, model, self.order, list(zip(model.rotations, turns, strict=True)))
+        P = self.form.turned(t, P, T, self.nothing(t), [])
         linear = self.compensation.corrected(t, u.code.linearise(x), self.order, u.rests)
         y = [t.value(plus(v, dot(h, [apart[i] for i in self.order]))) for v, h in zip(linear.y, linear.H, strict=True)]
         return self.sequence(u, self.innovation(u, replace(linear, y=y)), plain=False, P=P)
@@ -69,7 +71,7 @@ class Iekf(Ekf):
         for place, (i, m) in enumerate(zip(self.order, list(moved), strict=True)):
             if is_zero(m):
                 continue
-            part = model.parts[i]
+            part = model.space.singles[i][2]
             x[i] = part.retract(u.x[i], m)
             if not part.flat:
                 moved[place] = part.local(x[i], u.x[i])

@@ -89,6 +89,8 @@ def whole_vector(
         P, doubtful = form.bounded(t, P, prior, final.share, seeing.tolerance)
     t.section("state")
     x = ukf.moved(u, motion)
+    if u.turns:
+        P = ukf.reset(u, P)
     evidence = ukf.unconfined(x) + form.evidence(P, after_predict=final is not first)
     P = ukf.limited(t, P)
     x = ukf.state.confined(t, x)
@@ -160,7 +162,7 @@ class _Whole:
                 if made:
                     t.flag(low, "REGULARIZED")
                 S[i][i] = select(low, t.value(floor), S[i][i])
-        names = [c.name for c in self.seeing.sensor.spec.components]
+        names = list(self.seeing.sensor.errors)
         epsilon = self.ukf.scalar.epsilon
         noise = [t.value(0) if self.sure else self._rounding(a, seen) for a in range(m)]
         trust = Trust(self.sure, self.definite, 8 * epsilon, noise)
@@ -175,11 +177,15 @@ class _Whole:
             terms = [dense[i, i] * (slope * slope) for i, slope in enumerate(h) if not is_zero(slope)]
             return u.t.value(sum(terms) * (8 * self.seeing.n * epsilon))
         # points differ from each other by the rounding of what h adds up, if by nothing else
-        size: Value = seen.z[a] if not self.exact else u.t.function("abs", seen.z[a])
+        component = self.seeing.sensor.space.numbers_of[a]
+        size: Value = u.t.one if component is None else seen.z[component]
+        size = size if not self.exact else u.t.function("abs", size)
         if self.exact:
             for place, slope in zip(self.ukf.order, h, strict=True):
+                number = u.code.model.space.numbers_of[place]
                 if not is_zero(slope):
-                    size = size + u.t.function("abs", u.x[place] * slope)
+                    reach = slope if number is None else u.x[number] * slope
+                    size = size + u.t.function("abs", reach)
         return size * size * (sum(abs(w) for w in points.wc) * (32 * epsilon) ** 2)
 
     def inflated(

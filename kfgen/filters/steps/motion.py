@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.filters.algebra.attitude import Attitude, dual_cross, of_numbers
-from kfgen.filters.algebra.dual import Dual, Evaluator
+from kfgen.filters.algebra.dual import Dual, Evaluator, attitudes
 from kfgen.filters.algebra.span import Limits, span
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
@@ -116,9 +116,9 @@ def integrate(
     dynamics = model.spec.dynamics
     h = dt * Fraction(1, dynamics.substeps)
     constant = {name: d for name, d in duals.items() if name not in model.states}
-    for w in model.noises:
-        if w.name not in held:
-            constant[w.name] = Dual(t.zero)
+    for noise in model.noises:
+        if noise.name not in held:
+            constant[noise.name] = Dual(t.zero)
     moving = [i for i, e in enumerate(model.f) if e != 0]
 
     def rate(x: list[Dual]) -> tuple[list[Dual], list[list[Dual]]]:
@@ -138,6 +138,9 @@ def integrate(
         return x
 
     x = [duals[name] for name in model.states]
+    given = attitudes(t, model, duals)
+    for r in model.rotations:
+        x[r.first : r.first + 4] = given[r.name].numbers()
     whole = [Dual(t.zero) for _ in x]
     for step in range(dynamics.substeps):
         k1, w1 = rate(x)

@@ -10,7 +10,7 @@ from operator import and_
 import sympy
 
 from kfgen.filters.algebra.attitude import of_numbers
-from kfgen.filters.algebra.dual import Attitude, Dual, Evaluator, seeds, state_seeds
+from kfgen.filters.algebra.dual import Attitude, Dual, Evaluator, seeds, state_seeds, state_values
 from kfgen.filters.algebra.factors import udu, udu_computed
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import is_zero, require_nonnegative, select
@@ -82,7 +82,7 @@ class SensorCode:
         given.update(seeds(t, {w.name: t.zero for w in sensor.noises}))
         evaluator = self._evaluator(given)
         h = [evaluator(e) for e in sensor.h]
-        attitudes = [self._attitude(evaluator, r, h) for r in sensor.rotations]
+        attitudes = [predicted_attitude(evaluator, sensor, r, h) for r in sensor.rotations]
         for r, attitude in zip(sensor.rotations, attitudes, strict=True):
             h[r.first : r.first + 4] = [Dual(value) for value in attitude.q]
         y = self._residuals(evaluator, [p.value for p in h])
@@ -97,14 +97,6 @@ class SensorCode:
         added = self._noise(evaluator, predicted)
         return Linearised(predicted, y, [[row[i] for i in self.order] for row in H], R, added)
 
-    def _attitude(self, evaluator: Evaluator, r: RotationModel, h: list[Dual]) -> Attitude:
-        """The prediction of a quaternion."""
-        own = self.sensor.h[r.first : r.first + 4]
-        for state in self.model.rotations:
-            if state.geometry == r.geometry and tuple(e.name for e in own if e.is_Symbol) == state.parts:
-                return evaluator.attitudes[state.name]
-        return of_numbers(self.t, r.name, r.geometry, h[r.first : r.first + 4])
-
     def noise_covariance(self, evaluator: Evaluator | None = None) -> Rows:
         """Of the noise inputs of the sensor; by default at the prior."""
         if evaluator is None:
@@ -118,10 +110,19 @@ class SensorCode:
         given = {name: Dual(value) for name, value in zip(self.model.states, x, strict=True)}
         given.update({w.name: Dual(t.zero) for w in self.sensor.noises})
         evaluator = self._evaluator(given)
+        return self._residuals(evaluator, self._predicted(evaluator), named=False)
+
+    def predicted(self, x: list[Value]) -> list[Value]:
+        """h(x)."""
+        given = state_values(self.model, x)
+        given.update({w.name: Dual(self.t.zero) for w in self.sensor.noises})
+        return self._predicted(self._evaluator(given))
+
+    def _predicted(self, evaluator: Evaluator) -> list[Value]:
         h = [Dual(evaluator.value(e)) for e in self.sensor.h]
         for r in self.sensor.rotations:
-            h[r.first : r.first + 4] = [Dual(value) for value in self._attitude(evaluator, r, h).q]
-        return self._residuals(evaluator, [d.value for d in h], named=False)
+            h[r.first : r.first + 4] = [Dual(v) for v in predicted_attitude(evaluator, self.sensor, r, h).q]
+        return [d.value for d in h]
 
     def residuals(self, x: list[Value], predicted: list[Value], named: bool = True) -> Vector:
         """The same for a prediction (m,) that is not h(x) alone."""
@@ -183,6 +184,15 @@ class SensorCode:
                         if not (is_zero(M[i][a]) or is_zero(Re[a][b]) or is_zero(M[j][b])):
                             added[i][j] = added[i][j] + M[i][a] * Re[a][b] * M[j][b]
         return added
+
+
+def predicted_attitude(evaluator: Evaluator, sensor: SensorModel, r: RotationModel, h: list[Dual]) -> Attitude:
+    """The prediction of a quaternion; h: of all components."""
+    own = sensor.h[r.first : r.first + 4]
+    for state in evaluator.model.rotations:
+        if state.geometry == r.geometry and tuple(e.name for e in own if e.is_Symbol) == state.parts:
+            return evaluator.attitudes[state.name]
+    return of_numbers(evaluator.trace, r.name, r.geometry, h[r.first : r.first + 4])
 
 
 def total(linear: Linearised) -> Rows:

@@ -20,7 +20,7 @@ from kfgen.filters.covariance.full.updates import Updates
 from kfgen.filters.covariance.loops.looped import Looped, Looping
 from kfgen.filters.covariance.loops.motion import ArrayGain, Displacement
 from kfgen.filters.covariance.loops.space import Space, fill
-from kfgen.filters.covariance.noise import Additive, Given
+from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Gathering, Part, Removal, Scalar
 from kfgen.filters.frame.runs import put
 from kfgen.ir.trace import Array, Trace, Value
@@ -87,9 +87,11 @@ class LoopedFull(Looped, FullStore):
     ) -> tuple[ArrayEntries, list[ArrayGain]]:
         return self.updates.update(t, P, measurements, motion)
 
-    def turned(self, t: Trace, P: ArrayEntries, T: Rows) -> ArrayEntries:
+    def turned(
+        self, t: Trace, P: ArrayEntries, T: Rows, Q: Additive, noise: list[tuple[Vector, Value]]
+    ) -> ArrayEntries:
         before = P.written() if P.terms else P
-        return self.predict(t, before, T, Given([[t.zero] * self.n for _ in T]), []).written()
+        return self.predict(t, before, T, Q, noise).written()
 
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         t, n = moved.space.t, self.n

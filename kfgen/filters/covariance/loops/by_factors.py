@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from kfgen.filters.algebra.linalg import Rows
+from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.triangles import strict_start
 from kfgen.filters.covariance.base import Straight
 from kfgen.filters.covariance.kernels.function import Passed
@@ -15,6 +15,7 @@ from kfgen.filters.covariance.loops.absorber import Absorber
 from kfgen.filters.covariance.loops.looped import Looped, Looping
 from kfgen.filters.covariance.loops.motion import AppliedGain, ArrayGain, Displacement, array_of_gain, start_moved
 from kfgen.filters.covariance.loops.space import Space
+from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Scalar
 from kfgen.filters.frame.runs import Put
 from kfgen.ir.program import Function
@@ -61,7 +62,7 @@ class ByFactors(Looped):
             return AppliedGain(moved, variance, s[1], sound=True)
         return ArrayGain(t, gain, nu, variance, sound=True)
 
-    def turned(self, t: Trace, P: Any, T: Rows) -> Any:
+    def turned(self, t: Trace, P: Any, T: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Any:
         """The columns of the factors, turned, are absorbed anew."""
         P = self._owned(P)
         space, n = P.space, self.n
@@ -69,10 +70,8 @@ class ByFactors(Looped):
         columns, diagonal = space.array("factor_before", n * (n - 1) // 2), space.array("diagonal_before", n)
         with t.loop("i", 0, n * (n - 1) // 2) as i:
             columns[i] = U[i]
-            U[i] = 0
         with t.loop("i", 0, n) as i:
             diagonal[i] = D[i]
-            D[i] = 0
 
         def column_of(k: Value, entry: Put) -> None:
             with t.loop("i", 0, k) as i:
@@ -85,7 +84,7 @@ class ByFactors(Looped):
             first = isinstance(k, int) and k == 0  # its column is taken as a unit vector
             return diagonal[0] * diagonal[0] if first else t.one
 
-        self.absorber.turn(space, T, column_of, weight)
+        self.absorber.turn(space, T, Q, noise, column_of, weight)
         return self._turned(P)
 
     @abstractmethod

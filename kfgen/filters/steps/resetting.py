@@ -1,0 +1,23 @@
+"""How errors are seen from where rotations have been turned to (Mueller, Hehn & D'Andrea 2017)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kfgen.filters.algebra.linalg import Rows
+from kfgen.geometry import Turn
+from kfgen.ir.trace import Trace
+from kfgen.model import Model
+from kfgen.model.rotations import RotationModel
+
+
+def moving(t: Trace, model: Model, order: Sequence[int], turns: list[tuple[RotationModel, Turn]]) -> Rows:
+    """T (n, n) in the inner order."""
+    n = len(order)
+    T = [[t.one if i == j else t.zero for j in range(n)] for i in range(n)]
+    for r, turn in turns:
+        block = r.geometry.moved(turn)
+        for i in range(3):
+            for j in range(3):
+                T[r.first_error + i][r.first_error + j] = t.value(block[i][j])
+    return [[T[i][j] for j in order] for i in order]
