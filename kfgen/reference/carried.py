@@ -37,10 +37,10 @@ def carried_by_sensor(model: Model, sensor: Sensor) -> tuple[str, ...]:
 
 
 def wrapped_by_process(model: Model) -> tuple[int, ...]:
-    """The periodic states whose images have to be wrapped."""
+    """The periodic states (their indices in P) whose images have to be wrapped."""
     held = [noise.name for noise in model.spec.noise if not noise.density]
     after = Formulas(model, held).step()
-    return tuple(i for i in model.periods if _turns(model, after[model.states[i]]))
+    return tuple(i for i in model.turns if _turns(model, after[model.errors[i]]))
 
 
 def wrapped_by_sensor(model: Model, sensor: Sensor) -> tuple[int, ...]:
