@@ -156,7 +156,7 @@ class Limits:
         self._ceiling = self._compile(options.variance_ceiling)
 
     def _compile(self, entries: Mapping[str, Expression]) -> dict[int, Closure]:
-        return {self.model.index[name]: self.model.scope.compile(entry) for name, entry in entries.items()}
+        return {self.model.row[name]: self.model.scope.compile(entry) for name, entry in entries.items()}
 
     def corrected(self, x: Vector, P: Matrix, d: Vector, context: Context) -> tuple[Vector, Matrix, Status]:
         """What an update stores that moves x (nx) by the error d (n): x [+] d, and P (n, n) as seen from there.

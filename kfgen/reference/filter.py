@@ -20,6 +20,7 @@ from kfgen.reference.parameters import Parameters
 from kfgen.reference.reading import Read
 from kfgen.reference.sensor import Reading
 from kfgen.reference.status import Status, StepError
+from kfgen.spec.tree import Name
 from kfgen.spec.types import Filter, Spec
 
 
@@ -119,7 +120,7 @@ class ReferenceFilter:
         self.nis_of_modes = (0.0,) * len(self.algorithm.options)
         self.log_likelihood = 0.0
         self.gate_count = dict.fromkeys(self.sensors, 0)
-        self._uninitialised = self.spec.initialize is not None
+        self._uninitialised = bool(self.spec.initialize)
         return int(Status.OK)
 
     def set_state(self, x: ArrayLike) -> int:
@@ -260,18 +261,21 @@ class ReferenceFilter:
 
     def _initialises(self, reading: Reading) -> bool:
         """Whether this reading is the first one of the sensor that sets the initial states."""
-        rule = self.spec.initialize
-        if rule is None or not self._uninitialised or rule.sensor != reading.sensor.name:
+        if not self._uninitialised:
             return False
-        components = reading.sensor.components
-        return all(components.index(component) in reading.used for component in rule.states.values())
+        sources, components = self._sources(reading), reading.sensor.components
+        return bool(sources) and all(components.index(component) in reading.used for component in sources.values())
+
+    def _sources(self, reading: Reading) -> dict[str, str]:
+        """State -> the component that sets it, of the sensor's first reading."""
+        rules = [rule for rule in self.spec.initialize if rule.sensor == reading.sensor.name]
+        return {state: e.tree.name for rule in rules for state, e in rule.states.items() if isinstance(e.tree, Name)}
 
     def _initialise(self, reading: Reading) -> Status:
         """Sets the states that the spec names from the reading; the covariance stays, no update is made."""
-        rule = self.spec.initialize
-        assert rule is not None
         components = reading.sensor.components
-        entries = {self.model.place[state]: components.index(component) for state, component in rule.states.items()}
+        sources = self._sources(reading)
+        entries = {self.model.index[state]: components.index(component) for state, component in sources.items()}
 
         def change(x: Vector) -> Vector:
             x = x.copy()
@@ -279,8 +283,7 @@ class ReferenceFilter:
             return self.model.wrap(self.model.clip(x))
 
         self._estimate = self.algorithm.placed(self._estimate, change)
-        self._uninitialised = False
-        self.nis = 0.0
+        self._uninitialised, self.nis = False, 0.0
         return Status.OK
 
 

@@ -62,7 +62,7 @@ class Model:
     Attributes:
         space: the states and their errors. nx, n: how many numbers x has, and how many its error.
         states, errors, inputs: their names.
-        index: error -> its index in P; place: state -> its index in x.
+        row: error -> its index in P; index: state -> its index in x.
         periods: index of an angle or periodic state -> its period; turns: the same by the index in P.
         x0 (nx), P0 (n, n): the initial estimate, wrapped.
         values: the parameters' values in the spec.
@@ -75,8 +75,8 @@ class Model:
         self.inputs = tuple(entry.name for entry in spec.inputs)
         self.space = Manifold(self.states, spec.rotations)
         self.nx, self.n, self.errors = self.space.n, self.space.k, self.space.errors
-        self.index = {name: i for i, name in enumerate(self.errors)}
-        self.place = {name: i for i, name in enumerate(self.states)}
+        self.row = {name: i for i, name in enumerate(self.errors)}
+        self.index = {name: i for i, name in enumerate(self.states)}
         constants = _constants(spec)
         parameters = tuple(parameter.name for parameter in spec.parameters)
         first = Scope(constants, parameters)
@@ -94,7 +94,7 @@ class Model:
             self.scope.define(definition.name, definition.value)
 
         self.periods = {i: self.number(state.period) for i, state in enumerate(spec.states) if state.period is not None}
-        self.turns = {self.index[self.states[i]]: period for i, period in self.periods.items()}
+        self.turns = {self.row[self.states[i]]: period for i, period in self.periods.items()}
         low, high = np.full(self.nx, -math.inf), np.full(self.nx, math.inf)
         for i, state in enumerate(spec.states):
             if state.bounds is not None:
@@ -164,14 +164,14 @@ class Model:
         P = np.zeros((self.n, self.n))
         if spec.P0 is not None:
             P = np.array([[self.number(entry) for entry in row] for row in spec.P0])
-        variances = {state.name: state.variance for state in spec.states if state.name in self.index}
+        variances = {state.name: state.variance for state in spec.states if state.name in self.row}
         for rotation in spec.rotations:
             variances |= dict(zip(rotation.errors, rotation.variances, strict=True))
         for name, variance in variances.items():
             if variance is not None:
-                P[self.index[name], self.index[name]] = self.number(variance)
+                P[self.row[name], self.row[name]] = self.number(variance)
         for pair in spec.covariances:
-            i, j = self.index[pair.first], self.index[pair.second]
+            i, j = self.row[pair.first], self.row[pair.second]
             P[i, j] = P[j, i] = self.number(pair.value)
         try:
             check_covariance(P)

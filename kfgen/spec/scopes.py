@@ -246,7 +246,7 @@ class Scopes:
     def _references(self) -> None:
         states = [s.name for s in self.spec.states]
         sensors = {s.name: [c.name for c in s.components] for s in self.spec.measurements}
-        initialize = self.spec.initialize
+        initialize = self.spec.initialize[0] if self.spec.initialize else None
         for reference, word, path in self.walker.references:
             known: list[str] = []
             of = reference.of

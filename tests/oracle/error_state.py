@@ -177,14 +177,18 @@ class ErrorState:
         measured = measured or Space(len(z), ())
         x, weight = prior, np.linalg.inv(R)
         for _ in range(times):
-            at = x
-            H = derivative(lambda d: measured.minus(h(space.plus(at, d)), h(at)), space.k)
-            J = derivative(lambda d: space.minus(space.plus(at, d), prior), space.k)
-            e, y = space.minus(at, prior), measured.minus(np.asarray(z, float), h(at))
+            H, J = self._jacobians(x, prior, h, measured)
+            e, y = space.minus(x, prior), measured.minus(np.asarray(z, float), h(x))
             N = J.T @ information @ J + H.T @ weight @ H
             d = np.linalg.solve(N, H.T @ weight @ y - J.T @ information @ e)
-            x = space.unit(space.plus(at, d))
+            x = space.unit(space.plus(x, d))
         self.x, self.P = x, np.linalg.inv(N)
+
+    def _jacobians(self, x, prior, h, measured):
+        """Of the reading and of the distance from the prior, at an iterate."""
+        space, predicted = self.space, h(x)
+        H = derivative(lambda d: measured.minus(h(space.plus(x, d)), predicted), space.k)
+        return H, derivative(lambda d: space.minus(space.plus(x, d), prior), space.k)
 
     # --- sigma points (merwe)
 

@@ -13,6 +13,7 @@ from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
+from kfgen.spec.tree import Name
 
 NIS = Block("nis", None, "normalised innovation squared of the last update")
 
@@ -67,7 +68,7 @@ class StateCode:
             else:
                 out.append(Block("t", None, "time since init [s]"))
                 out.append(Block("t_lost", None, "what the sum of t has rounded away [s]"))
-        if model.spec.initialize is not None:
+        if model.spec.initialize:
             out.append(Block("initialized", None, "the first measurement has set the state", kind="bool"))
         return out
 
@@ -89,21 +90,22 @@ class StateCode:
 
         used: whether each component counts, where a mask tells.
         """
-        start = self.model.spec.initialize
-        if start is None or start.sensor != sensor.name:
+        start = next((rule for rule in self.model.spec.initialize if rule.sensor == sensor.name), None)
+        if start is None:
             return
+        sources = {name: e.tree.name for name, e in start.states.items() if isinstance(e.tree, Name)}
         t.section("the first measurement sets the state")
         done = t.wrapped(t.pool.make("field", (), "kf.initialized", "bool"))
         readings = [t.field(f"z.{c.name}") for c in sensor.spec.components]
         if used is not None:
             names = [c.name for c in sensor.spec.components]
-            for component in start.states.values():
+            for component in sources.values():
                 done = done | ~used[names.index(component)]
             readings = [select(u, z, t.zero) for u, z in zip(used, readings, strict=True)]
         t.guard(~t.finite(sum(readings[1:], readings[0])), "NOT_FINITE")
-        x = [t.field(f"z.{start.states[s]}") if s in start.states else t.zero for s in self.model.states]
+        x = [t.field(f"z.{sources[s]}") if s in sources else t.zero for s in self.model.states]
         x = self.confined(t, x)
-        set_here = [i for i, s in enumerate(self.model.states) if s in start.states]
+        set_here = [i for i, s in enumerate(self.model.states) if s in sources]
         stores = [Store(path, t.pool.integer(i), x[i].node) for path in self.states for i in set_here]
         stores.append(Store("kf.nis", None, t.pool.zero))
         stores.append(Store("kf.initialized", None, t.pool.boolean(True)))

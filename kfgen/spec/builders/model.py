@@ -126,8 +126,8 @@ class ModelBuilder:
             f.get("partial", False),
             f.get("rate"),
             self.own(f),
-            f.get("doc", ""),
-            f.place,
+            doc=f.get("doc", ""),
+            place=f.place,
         )
 
     def own(self, f: Fields) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from kfgen.spec.builders.values import Values
 from kfgen.spec.constants import keep
 from kfgen.spec.problems import short
 from kfgen.spec.raw import Fields, Word, entries, limits, matrix
-from kfgen.spec.tree import Expression
+from kfgen.spec.tree import Expression, Name
 from kfgen.spec.types import Code, Constant, Fixed, Initialize, Input, Parameter, Spec, Step
 from kfgen.spec.walk import Walker
 
@@ -100,13 +100,14 @@ class Builder:
             for name, f in entries(self.top.get("inputs"))
         )
 
-    def initialize(self) -> Initialize | None:
+    def initialize(self) -> tuple[Initialize, ...]:
         written = self.top.get("initialize")
         if not isinstance(written, Fields):
-            return None
+            return ()
         sensor = written.get("from")
-        states = {n: w.text for n, w in entries(written.get("states")) if isinstance(w, Word)}
-        return Initialize(sensor.text if isinstance(sensor, Word) else "", states)
+        words = [(name, word) for name, word in entries(written.get("states")) if isinstance(word, Word)]
+        states = {name: Expression(Name(word.text), word.text, word.place) for name, word in words}
+        return (Initialize(sensor.text if isinstance(sensor, Word) else "", states, place=written.place),)
 
     # --- options
 

@@ -71,6 +71,7 @@ def _residual(facts: Facts, residual: Expression, model: Model) -> None:
 
 
 def _initialize(facts: Facts) -> None:
-    initialize = facts.spec.initialize
-    if initialize is not None and not initialize.states and facts.empty("initialize.states"):
-        facts.add(facts.at("initialize.states"), "no state is set", "write `states: {px: x}`")
+    for initialize in facts.spec.initialize:
+        path = f"{initialize.place.path}.states"
+        if not initialize.states and facts.empty(path):
+            facts.add(facts.at(path), "no state is set", "write `states: {px: x}`")
