@@ -9,6 +9,7 @@ from typing import Any
 import sympy
 
 from kfgen.model import functions as kf
+from kfgen.model import turning
 from kfgen.spec.tree import Call, Name, Number, Tree, names
 from kfgen.spec.types import Constant
 
@@ -20,7 +21,7 @@ def to_sympy(tree: Tree, known: Mapping[str, Any]) -> Any:
     if isinstance(tree, Number):
         return sympy.Rational(tree.value.numerator, tree.value.denominator)
     if isinstance(tree, Name):
-        if tree.name == "pi":
+        if tree.name == "pi" and "pi" not in known:
             return sympy.pi
         if tree.name == "e" and "e" not in known:
             return sympy.E
@@ -91,4 +92,7 @@ _CALLS: dict[str, Callable[..., Any]] = {
     "floor": kf.Floor,
     "where": kf.Where,
     "table": kf.Table,
+    "rotation": turning.entry,
+    "rotation_vector": turning.rotation_vector,
+    "from_rotation_vector": turning.from_rotation_vector,
 }  # fmt: skip

@@ -149,6 +149,7 @@ class Initialize:
     sensor: str
     states: Mapping[str, Expression]
     variance: Mapping[str, Expression] = field(default_factory=dict)
+    let: tuple[Definition, ...] = ()  # what the expressions share, each using only those before it
     place: Place = NOWHERE
 
 

@@ -56,7 +56,7 @@ def _sensor(facts: Facts, sensor: Sensor, model: Model) -> None:
         if component.h.tree == BAD or not states:
             continue
         used = model.context.uses(component.h)
-        unknown = [n for n in used if n not in model.context.kinds and n not in ("pi", "e", "dt", "t")]
+        unknown = [n for n in used if model.context.kind_of(n) is None]
         if not used & states and not unknown and not used & doubtful:
             facts.add(component.h.place, "h depends on no state, so it measures nothing", "write what is measured")
         if component.residual is not None and component.residual.tree != BAD:
