@@ -18,7 +18,7 @@ from kfgen.reference.mode import ModeView
 from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.parameters import Parameters
 from kfgen.reference.reading import Read
-from kfgen.reference.sensor import Reading, SensorModel
+from kfgen.reference.sensor import Reading
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.tree import Name
 from kfgen.spec.types import Filter, Spec
@@ -28,7 +28,8 @@ class ReferenceFilter:
     """One filter, in float64 and physical units.
 
     Attributes (arrays are copies):
-        x (n), P (n, n): the estimate, in the spec's order of the states.
+        x (nx), P (n, n): the estimate, in the spec's order of the states; P is that of the error, in which a quaternion
+            counts three.
         nis: normalised innovation squared of the last update, also of a gated one; 0 after init.
         log_likelihood: of the last update that was made.
         t: seconds since init.
@@ -123,10 +124,13 @@ class ReferenceFilter:
         return int(Status.OK)
 
     def set_state(self, x: ArrayLike) -> int:
-        """Sets x (n), wrapped; NOT_FINITE leaves the filter as it was."""
-        new = np.array(x, dtype=np.float64).reshape(self.model.n)
+        """Sets x (nx), wrapped, quaternions normalised; NOT_FINITE, and NOT_POSITIVE for a quaternion with a norm below
+        1e-3, leave the filter as it was."""
+        new = np.array(x, dtype=np.float64).reshape(self.model.nx)
         if not np.isfinite(new).all():
             return int(Status.NOT_FINITE)
+        if self.model.space.short(new):
+            return int(Status.NOT_POSITIVE)
         self._estimate = self.algorithm.placed(self._estimate, lambda x: self.model.wrap(new))
         return int(Status.OK)
 
@@ -202,7 +206,7 @@ class ReferenceFilter:
         model = self.sensors[sensor]
         measured = np.array(z, dtype=np.float64).reshape(model.m)
         inputs = self._inputs(u, needed=model.takes_inputs)
-        used = _used(model, mask)
+        used = model.chosen(mask)
         if not used:
             return int(Status.OK)
         reading = Reading(model, measured, used, Context(self.parameters, inputs, self._clock.now, 0.0))
@@ -210,6 +214,8 @@ class ReferenceFilter:
             self._test(self._read.update(sensor, used), inputs)
             if not np.isfinite(measured[list(used)]).all():
                 raise StepError(Status.NOT_FINITE)
+            if reading.space.short(measured[list(used)]):
+                raise StepError(Status.NOT_POSITIVE)
             if self._initialises(reading):
                 return int(self._initialise(reading))
             with np.errstate(all="ignore"):
@@ -287,14 +293,3 @@ def _is_root(options: Filter) -> bool:
 
 def _keeps_points(options: Filter) -> bool:
     return options.sigma_points is not None and not options.sigma_points.redraw
-
-
-def _used(sensor: SensorModel, mask: int | Sequence[bool] | None) -> tuple[int, ...]:
-    """The components that a mask selects; all without one."""
-    if mask is None:
-        return tuple(range(sensor.m))
-    if not sensor.partial:
-        raise TypeError(f"sensor {sensor.name} takes no mask")
-    if isinstance(mask, int | np.integer):
-        return tuple(i for i in range(sensor.m) if int(mask) >> i & 1)
-    return tuple(i for i, bit in enumerate(mask) if bit)

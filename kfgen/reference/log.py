@@ -18,7 +18,7 @@ from kfgen.reference.status import Status
 class Run:
     """A filter's course over a log of r rows, after each row.
 
-    x (r, n), var (r, n): the estimate and the diagonal of its covariance. nis: sensor -> (r), NaN in rows
+    x (r, nx), var (r, n): the estimate and the diagonal of its covariance. nis: sensor -> (r), NaN in rows
     without an update of it (or with one that failed). status (r): the bits of the row's calls, or-ed. mu (r, B):
     the probabilities of the modes of an imm, else None.
     """
@@ -56,7 +56,7 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
             readings[sensor.name] = np.column_stack([columns.get(name, absent) for name in names])
 
     result = Run(
-        np.zeros((rows, kf.model.n)),
+        np.zeros((rows, kf.model.nx)),
         np.zeros((rows, kf.model.n)),
         {name: np.full(rows, math.nan) for name in kf.sensors},
         np.zeros(rows, dtype=np.int64),
