@@ -84,6 +84,17 @@ class Turn:
         """Jl(d) (3, 3): exp(d + e) = exp(Jl e) exp(d) to first order."""
         return self._combined(self.c1, self.c2, self.c3)
 
+    def inverse(self, body: bool) -> Rows:
+        """Of Jr(d), or of Jl(d), for |d| <= pi."""
+        t, u = self.trace, self.squares
+        cosine, sine = self.half
+        near = t.value(Fraction(1, 12)) + u * (Fraction(1, 720) + u * (Fraction(1, 30240) + u * Fraction(1, 1209600)))
+        square = t.variable(t.unique("bend"), near)
+        with t.when(u > Fraction(1, 512)):
+            square.set((1 - cosine / sine) / u)
+        found, half = t.value(square.get()), t.value(Fraction(1, 2) if body else Fraction(-1, 2))
+        return self._combined(1 - u * found, half, found)
+
     def back(self) -> Rows:
         """R(exp(d))^T (3, 3)."""
         return self._combined(1 - self.squares * self.c2, -self.c1, self.c2)

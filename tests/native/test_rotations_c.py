@@ -149,9 +149,22 @@ def test_any_start(error, kind):
         assert np.isfinite(kf.P).all()
 
 
+BANKS = [
+    (Filter("ekf", "full", "joseph"), Filter("ekf", "full", "joseph")),
+    (Filter("ekf", "ud", "bierman"), Filter("iekf", "ud", "bierman", iterations=2)),
+    (inertial.ukf("ud"), Filter("ekf", "full", "standard")),
+    (inertial.ukf("sqrt"), Filter("ekf", "sqrt", None)),
+]  # fmt: skip
+
+
 @BOTH
-def test_imm(error):
-    along(bank(error), tracker_calls(40))
+@pytest.mark.parametrize("filters", BANKS, ids=lambda f: "+".join(f"{each.type}-{each.covariance}" for each in f))
+@pytest.mark.parametrize("unroll", ["auto", "none"])
+def test_imm(error, filters, unroll):
+    spec = bank(error)
+    modes = tuple(replace(mode, filter=chosen) for mode, chosen in zip(spec.imm.modes, filters, strict=True))
+    spec = replace(spec, imm=replace(spec.imm, modes=modes), code=Code(unroll=unroll))
+    along(spec, tracker_calls(30), 1e-7)
 
 
 def test_a_million_float_steps_keep_the_norm():

@@ -16,7 +16,7 @@ from kfgen.filters.algebra.dual import Dual, Evaluator
 from kfgen.filters.algebra.numbers import Number, assume_positive, is_zero, select
 from kfgen.filters.bank.covariance import BankCovariance
 from kfgen.filters.bank.loops import Source, mixed_in_loops
-from kfgen.filters.bank.mixing import Estimate, mixed, normalised, spread, transition
+from kfgen.filters.bank.mixing import Estimate, mixed, normalised, seen_from_mean, spread, transition
 from kfgen.filters.bank.mode import Mode
 from kfgen.filters.bank.trace import BankTrace, Scope
 from kfgen.filters.base import KF, Block, FilterCode, ModeNote
@@ -27,6 +27,7 @@ from kfgen.filters.steps import process
 from kfgen.filters.steps.gate import gate, store_outcome
 from kfgen.filters.steps.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.steps.process import Step
+from kfgen.filters.steps.sensor import used_errors
 from kfgen.filters.steps.state import NIS, StateCode
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
@@ -48,7 +49,8 @@ class Imm:
         self.lively = bank.lively(scalar.smallest, scalar.probability)
         self.modes = [Mode(name, f, (*f.own_blocks(), NIS)) for name, f in zip(bank.names, filters, strict=True)]
         forms = [f.form for f in filters]
-        self.mixers = [form.mixer(forms) for form in forms]
+        # loops go through whole states, of which a quaternion is no part
+        self.mixers = [None if self.model.rotations else form.mixer(forms) for form in forms]
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
         fields = [field for mode in self.modes for field in mode.fields()]
         mu = Block("mu", len(self.modes), "probabilities of the modes", initial=bank.mu0)
@@ -69,7 +71,7 @@ class Imm:
         if self.outdated:
             functions.append(self.redraw(taken))
         remarks = [f"{mode.name}: {text}" for mode in self.modes for text in mode.filter.remarks()]
-        straight = list(range(len(self.model.states)))
+        straight = list(range(len(self.model.errors)))
         tables = {name: table for mode in self.modes for name, table in mode.filter.form.tables.items()}
         notes = []
         for mode in self.modes:
@@ -205,7 +207,10 @@ class Imm:
         with t.of(scope):
             t.section("where it starts from")
             mixture = spread(t, self.model, [part.x for part in parts], w, own)
-            x = [part.placed(v) for v, part in zip(mixture.mean, self.model.parts, strict=True)]
+            x = list(mixture.mean)
+            for i, _, part in self.model.space.singles:
+                x[i] = part.placed(x[i])
+            parts = seen_from_mean(t, self.model, parts, mixture)
             P = mixed(t, parts, w, mixture, own)
             with t.capture() as captured:
                 mode.filter.form.straight().store(t, P, mode.filter.names, after_predict=False)
@@ -222,15 +227,16 @@ class Imm:
         models = [mode.model.of(sensor) for mode, sensor in zip(self.modes, sensors, strict=True)]
         arguments, used = begin_update(t, models, sensors, partial)
         self.state.initialize(t, sensors[0], used)
+        counted = used_errors(sensors[0], used)
         scopes = [mode.scope() for mode in self.modes]
         runs: list[tuple[Scope, Phases]] = []
         first: list[Judged | Made] = []
         for mode, scope, sensor in zip(self.modes, scopes, sensors, strict=True):
-            runs.append((scope, mode.filter.of(sensor).updating(t, sensor, used)))
+            runs.append((scope, mode.filter.of(sensor).updating(t, sensor, counted)))
             first.append(_advance(t, *runs[-1]))
         t.settle()
         judged = [phase.nis for phase in first if phase.nis is not None]
-        gate(t, self.model, sensors, judged, used)
+        gate(t, self.model, sensors, judged, counted)
         made: list[Made] = []
         for run, phase in zip(runs, first, strict=True):
             while isinstance(phase, Judged):
