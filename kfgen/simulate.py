@@ -29,6 +29,7 @@ from kfgen.geometry import part_of
 from kfgen.logs import Log
 from kfgen.reference.dual import value_of
 from kfgen.reference.linalg import udu
+from kfgen.reference.manifold import Manifold
 from kfgen.reference.model import Context, Model, fixed_step
 from kfgen.reference.process import Process
 from kfgen.reference.sensor import Reading, SensorModel
@@ -93,7 +94,7 @@ def _simulate(spec: Spec, steps: int, random: Draws, every: Mapping[str, int], g
     modes = _mode_track(spec, model, dt, random)
     x = worlds[modes[0]].initial(random)
     run_time = spec.dt is not None and spec.dt.run_time
-    truth = np.empty((steps, model.n))
+    truth = np.empty((steps, model.nx))
     readings = {sensor.name: np.full((steps, len(sensor.components)), np.nan) for sensor in spec.measurements}
     now = 0.0
     for k in range(steps):
@@ -146,28 +147,28 @@ class _World:
         return _Meter(sensor, SensorModel(self.model, sensor), SensorModel(self.model, quiet))
 
     def initial(self, random: Draws) -> Array:
-        """A draw of the first state [n]."""
+        """A draw of the first state [nx]."""
         model = self.model
-        return self._placed(model.x0 + _draw(model.P0, random))
+        return self._placed(_moved(model.space, model.x0, _draw(model.P0, random)))
 
     def step(self, x: Array, context: Context, random: Draws) -> Array:
-        """The state [n] after a step with drawn noise."""
+        """The state [nx] after a step with drawn noise."""
         Qw = self._noise(self.model.environment(context, x))[np.ix_(self._held, self._held)]
         after = self._process.advance(x, _draw(Qw, random), context)
-        after = after + _draw(self._additive.linearise(x, context).Q, random)
+        after = _moved(self.model.space, after, _draw(self._additive.linearise(x, context).Q, random))
         if not np.all(np.isfinite(after)):
             raise KfgenError(f"{self.spec.name}: the simulated state left the finite numbers; try another --seed")
         return self._placed(after)
 
     def measure(self, name: str, x: Array, context: Context, random: Draws) -> Array:
-        """A drawn reading [m] of a sensor at the state x [n]."""
+        """A drawn reading [m] of a sensor at the state x [nx]."""
         meter = self._meters[name]
         used = tuple(range(meter.model.m))
         noise = self.model.noise_covariance(meter.spec.noise, meter.spec.noise_covariance)
         e = _draw(noise(self.model.environment(context, x)), random)
         z = np.array([value_of(h) for h in meter.model.predict(list(x), list(e), context, used)])
         R = meter.additive.linearise(x, Reading(meter.additive, z, used, context)).R
-        z = z + _draw(R, random)
+        z = _moved(meter.model.space, z, _draw(R, random))
         for i, component in enumerate(meter.spec.components):
             period = None if component.period is None else self.model.number(component.period)
             z[i] = part_of(period).placed(float(z[i]))
@@ -176,6 +177,11 @@ class _World:
     def _placed(self, x: Array) -> Array:
         x = self.model.clip(x)
         return np.array([part_of(self.model.periods.get(i)).placed(float(v)) for i, v in enumerate(x)])
+
+
+def _moved(space: Manifold, x: Array, d: Array) -> Array:
+    """x [+] d: errors of rotations are drawn in the tangent space."""
+    return space.moved(x, d) if space.rotations else x + d
 
 
 def _draw(P: Array, random: Draws) -> Array:

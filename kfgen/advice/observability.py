@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kfgen.advice.track import Array, Track
+from kfgen.advice.track import Array, Track, errors
 from kfgen.errors import Advice
 from kfgen.spec.problems import short
 from kfgen.spec.types import Spec
@@ -19,8 +19,8 @@ def advice(spec: Spec, tracks: Sequence[Track]) -> Iterator[Advice]:
     blind = _unseen(tracks)
     if not blind.size:
         return
-    silent = {i for i in range(len(spec.states)) if _known(tracks, i)}
-    states = spec.states
+    states = errors(spec)
+    silent = {i for i in range(len(states)) if _known(tracks, i)}
     for group in _groups(blind):
         if silent & set(group) or any(states[i].name in track.spec.filter.consider for track in tracks for i in group):
             continue  # what nobody claims to estimate

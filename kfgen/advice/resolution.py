@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.advice.track import Array, Track
+from kfgen.advice.track import Array, Track, errors
 from kfgen.errors import Advice
 from kfgen.scalar_names import FLOAT
 from kfgen.spec.problems import short
@@ -37,11 +37,11 @@ def advice(spec: Spec, tracks: Sequence[Track]) -> Iterator[Advice]:
     for track in tracks:
         magnitude = np.abs(track.x).max(axis=0)
         grain, step = ulp(magnitude), np.median(np.abs(track.step), axis=0)
-        doubtful = _doubtful(track, grain) & [state.name not in spec.code.compensated for state in spec.states]
+        doubtful = _doubtful(track, grain) & [state.name not in spec.code.compensated for state in errors(spec)]
         if not doubtful.any():
             continue
         sigma = _settled(track)
-        for i, state in enumerate(spec.states):
+        for i, state in enumerate(errors(spec)):
             lost = 0 < step[i] < grain[i] / 2 and 10 * ROUNDINGS * grain[i] > SHARE * sigma[i] > 0
             if not doubtful[i] or not (lost or too_coarse(magnitude[i : i + 1], sigma[i : i + 1])[0]):
                 continue

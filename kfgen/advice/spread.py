@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kfgen.advice.track import Track
+from kfgen.advice.track import Track, errors
 from kfgen.errors import Advice
 from kfgen.reference.sigma_points import SigmaRule
 from kfgen.scalar_names import FLOAT
@@ -46,7 +46,7 @@ def _angles(track: Track) -> Iterator[Advice]:
     if points is None:
         return
     reach = float(np.abs(SigmaRule(track.model).points(track.model.n).offsets).max())
-    for i, state in enumerate(track.spec.states):
+    for i, state in enumerate(errors(track.spec)):
         std = math.sqrt(max(float(track.model.P0[i, i]), 0.0))
         if state.kind != "angle" or reach * std <= math.pi:
             continue

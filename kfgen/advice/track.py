@@ -16,7 +16,7 @@ from kfgen.simulate import simulate
 from kfgen.spec.advice.usage import expressions
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.tree import Call
-from kfgen.spec.types import Dynamics, Spec
+from kfgen.spec.types import Dynamics, Spec, State
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ WORK = 100_000  # operations, with gradients: about a second
 class Track:
     """A spec (of a mode) with n states along k rows.
 
-    x (k, n): the states. step (k, n): what f moves them by, without noise. F (k, n, n), Q (n, n): of the step from each
+    x (k, n): the states, 0 in place of the errors of a quaternion. step (k, n): what f moves them by, without noise. F (k, n, n), Q (n, n): of the step from each
     row, its noise at the first. H, R: sensor -> (k, m, n), (m, m) likewise.
     """
 
@@ -92,16 +92,16 @@ def _along(spec: Spec, x: Array, u: Array, t: Array) -> Track:
     model = Model(spec)
     process = Process(model)
     dt = 1.0 if spec.dt is None else model.number(spec.dt.nominal)
-    rows, n = x.shape
+    rows, n = len(x), model.n
     F, step = np.empty((rows, n, n)), np.empty((rows, n))
     sensors = {sensor.name: SensorModel(model, sensor) for sensor in spec.measurements}
-    H = {name: np.empty((rows, sensor.m, n)) for name, sensor in sensors.items()}
+    H = {name: np.empty((rows, sensor.space.k, n)) for name, sensor in sensors.items()}
     R: dict[str, Array] = {}
     Q = np.zeros((n, n))
     for k in range(rows):
         context = Context(model.values, u[k], float(t[k]), dt)
         after = process.linearise(x[k], context)
-        F[k], step[k] = after.F, after.x - x[k]
+        F[k], step[k] = after.F, model.space.difference(after.x, x[k])
         for name, sensor in sensors.items():
             used = tuple(range(sensor.m))
             found = sensor.linearise(x[k], Reading(sensor, np.zeros(sensor.m), used, context))
@@ -109,8 +109,17 @@ def _along(spec: Spec, x: Array, u: Array, t: Array) -> Track:
             R.setdefault(name, found.R)
         if k == 0:
             Q = after.Q
-    for i, period in model.periods.items():
+    for i, period in model.turns.items():
         step[:, i] -= period * np.round(step[:, i] / period)
     if not (np.isfinite(F).all() and all(np.isfinite(each).all() for each in H.values())):
         raise KfgenError(f"{spec.name}: the model has no finite derivatives along a track of its own")
-    return Track(spec, model, x, step, F, Q, H, R)
+    return Track(spec, model, np.array([model.space.flat(row) for row in x]), step, F, Q, H, R)
+
+
+def errors(spec: Spec) -> list[State]:
+    """What the columns of a track are of: the states, three errors of a quaternion in place of its numbers."""
+    found = {state.name: state for state in spec.states}
+    for rotation in spec.rotations:
+        first = found[rotation.parts[0]]
+        found |= {name: replace(first, name=name) for name in rotation.errors}
+    return [found[name] for name in spec.errors]

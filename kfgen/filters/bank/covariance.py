@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from kfgen.filters.algebra.numbers import select
 from kfgen.filters.algebra.linalg import dot
-from kfgen.filters.algebra.numbers import Number
+from kfgen.filters.algebra.numbers import Number, select
 from kfgen.filters.bank.mixing import spread
 from kfgen.filters.bank.mode import Mode
 from kfgen.filters.bank.trace import BankTrace
