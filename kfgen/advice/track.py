@@ -29,7 +29,8 @@ WORK = 100_000  # operations, with gradients: about a second
 class Track:
     """A spec (of a mode) with n states along k rows.
 
-    x (k, n): the states, 0 in place of the errors of a quaternion. step (k, n): what f moves them by, without noise. F (k, n, n), Q (n, n): of the step from each
+    x (k, n): the states, 0 in place of the errors of a quaternion. step (k, n): what f moves them by, without noise.
+    F (k, n, n), Q (n, n): of the step from each
     row, its noise at the first. H, R: sensor -> (k, m, n), (m, m) likewise.
     """
 

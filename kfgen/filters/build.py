@@ -193,7 +193,8 @@ def linearise_rows(t: Trace, model: Model, sensor: Any) -> list[list[Any]]:
     """H alone, before decorrelation."""
     m, q = sensor.dimension, len(sensor.noises)
     plain = replace(
-        sensor, R=((sympy.S.Zero,) * m,) * m, noise_covariance=((sympy.S.Zero,) * q,) * q, residual=(None,) * len(sensor.h),
+        sensor, R=((sympy.S.Zero,) * m,) * m, noise_covariance=((sympy.S.Zero,) * q,) * q,
+        residual=(None,) * len(sensor.h),
     )  # fmt: skip
     code = SensorCode(t, model, plain, list(range(len(model.errors))))
     return code.linearise(code.prior()).H

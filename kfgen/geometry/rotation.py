@@ -89,10 +89,20 @@ class Rotation:
 
 def logarithm(p: Quaternion) -> list[Any]:
     """The rotation vector of a unit quaternion, |.| <= pi; of q and -q the same."""
-    if not any(isinstance(a, Value) for a in p):
-        return _logarithm(p)
-    t = next(a.trace for a in p if isinstance(a, Value))
-    w, x, y, z = (t.value(a) for a in p)
+    traced = [a for a in p if isinstance(a, Value)]
+    if traced:
+        return _traced_logarithm(traced[0].trace, [traced[0].trace.value(a) for a in p])
+    if all(isinstance(a, int | Fraction) for a in p):
+        return _exact_logarithm(p)
+    w, x, y, z = (float(a) for a in p)
+    sine = math.sqrt(x * x + y * y + z * z)
+    scale = 2 * math.atan2(sine, abs(w)) / sine if sine > 1e-150 else 2.0
+    scale = -scale if w < 0 else scale
+    return [scale * x, scale * y, scale * z]
+
+
+def _traced_logarithm(t: Trace, p: list[Value]) -> list[Any]:
+    w, x, y, z = p
     turned = w < 0
     w = t.name(t.select(turned, -w, w), "log_w")
     squares = t.name(x * x + y * y + z * z, "log_squares")
@@ -105,28 +115,19 @@ def logarithm(p: Quaternion) -> list[Any]:
     return [signed * a for a in (x, y, z)]
 
 
+def _exact_logarithm(p: Quaternion) -> list[Any]:
+    t = Trace()
+    w, *rest = (t.value(-a if p[0] < 0 else a) for a in p)
+    squares = rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]
+    if squares.constant == 0:
+        return [Fraction(0)] * 3
+    sine = t.function("sqrt", squares)
+    scale = 2 * t.function("atan2", sine, w) / sine
+    return [(scale * v).constant for v in rest]
+
+
 SMALL = Fraction(1, 2**22)
 """Squared sines below which the logarithm is its series: what this leaves out is s^4 / 5 < 2e-14."""
-
-
-def _logarithm(p: Quaternion) -> list[Any]:
-    if all(isinstance(a, int | Fraction) for a in p):
-        t = Trace()
-        values = [t.value(a) for a in p]
-        if p[0] < 0:
-            values = [-v for v in values]
-        squares = values[1] * values[1] + values[2] * values[2] + values[3] * values[3]
-        if squares.constant == 0:
-            return [Fraction(0)] * 3
-        sine = t.function("sqrt", squares)
-        scale = 2 * t.function("atan2", sine, values[0]) / sine
-        return [(scale * v).constant for v in values[1:]]
-    w, x, y, z = (float(a) for a in p)
-    if w < 0:
-        w, x, y, z = -w, -x, -y, -z
-    sine = math.sqrt(x * x + y * y + z * z)
-    scale = 2 * math.atan2(sine, w) / sine if sine > 1e-150 else 2.0
-    return [scale * x, scale * y, scale * z]
 
 
 def _squares(x: Quaternion) -> Any:

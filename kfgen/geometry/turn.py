@@ -1,4 +1,4 @@
-"""The exponential of a rotation vector, and its derivatives: entire functions of |d|^2, polynomials where that is small.
+"""The exponential of a rotation vector and its derivatives: entire functions of |d|^2, series where that is small.
 
 c0 = cos a, c1 = sin a / a, c2 = (1 - cos a) / a^2, c3 = (a - sin a) / a^3 with a^2 = |d|^2 (Stumpff 1959).
 """

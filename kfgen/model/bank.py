@@ -10,7 +10,8 @@ import sympy
 
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
-from kfgen.model.model import Model, SensorModel, build_model
+from kfgen.model.builder import build_model
+from kfgen.model.model import Model, SensorModel
 from kfgen.model.symbolic import to_sympy
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.types import Spec

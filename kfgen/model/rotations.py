@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
 import sympy
@@ -52,15 +53,17 @@ class Registry:
 
     def entry(self, numbers: Sequence[Symbolic], i: int, j: int) -> Symbolic:
         """Entry (i, j) of R(q)."""
-        names = tuple(n.name if n.is_Symbol else "" for n in numbers)
-        name = self.quartets.get(names) if len(names) == 4 else None  # type: ignore[arg-type]
+        name = self._known(numbers)
         if name is None:
-            back = tuple(n.name if n.is_Symbol else "" for n in (numbers[0], *(-n for n in numbers[1:])))
-            name = self.quartets.get(back)  # type: ignore[arg-type]
-            if name is None:
-                return entries(numbers)[i][j]
             numbers, i, j = [numbers[0], *(-n for n in numbers[1:])], j, i
+            name = self._known(numbers)
+        if name is None:
+            return entries(numbers)[i][j]
         return self._symbol(Turned(name, i, j), entries(numbers)[i][j])
+
+    def _known(self, numbers: Sequence[Symbolic]) -> str | None:
+        names = [n.name if n.is_Symbol else "" for n in numbers]
+        return next((own for quartet, own in self.quartets.items() if list(quartet) == names), None)
 
     def found(self, symbol: Symbolic) -> Turned | None:
         return self.turned.get(symbol.name) if symbol.is_Symbol else None
@@ -100,7 +103,7 @@ def entries(numbers: Sequence[Symbolic]) -> list[list[Symbolic]]:
     ]
 
 
-def rotation_models(rotations: Sequence[types.Rotation], names: Sequence[str]) -> tuple[RotationModel, ...]:
+def rotation_models(rotations: tuple[types.Rotation, ...], names: Sequence[str]) -> tuple[RotationModel, ...]:
     """Where the quaternions stand among states or components."""
     errors = types.error_names(names, rotations)
     return tuple(
@@ -126,13 +129,13 @@ def gathered(registry: Registry, total: Symbolic) -> Symbolic:
     for each in of_term:
         if each is not None:
             what, rest = each
-            for key, place in (((what.rotation, what.i, False), what.j), ((what.rotation, what.j, True), what.i)):
-                group = groups.setdefault(key, {})
+            for found_key, place in (((what.rotation, what.i, False), what.j), ((what.rotation, what.j, True), what.i)):
+                group = groups.setdefault(found_key, {})
                 group[place] = group.get(place, 0) + rest
     chosen = {key: group for key, group in groups.items() if len(group) > 1}
     out, done = [], set()
     for term, each in zip(terms, of_term, strict=True):
-        key = None
+        key: tuple[str, int, bool] | None = None
         if each is not None:
             what = each[0]
             keys = [(what.rotation, what.i, False), (what.rotation, what.j, True)]
@@ -142,8 +145,8 @@ def gathered(registry: Registry, total: Symbolic) -> Symbolic:
         elif key not in done:
             done.add(key)
             name, i, transposed = key
-            vector = tuple(sympy.sympify(chosen[key].get(j, 0)) for j in range(3))
-            out.append(registry.rotated(name, i, vector, transposed))  # type: ignore[arg-type]
+            a, b, c = (sympy.sympify(chosen[key].get(j, 0)) for j in range(3))
+            out.append(registry.rotated(name, i, (a, b, c), transposed))
     return sympy.Add(*out)
 
 
@@ -175,7 +178,7 @@ def increment(numbers: Sequence[Tree], parts: Quartet, lets: Mapping[str, Tree])
         return None
     found = [_resolved(tree, lets) for _, tree in (a, b, c, d)]
     for k, call in enumerate(found):
-        if not isinstance(call, Call) or call.op != "from_rotation_vector" or call.args[0] != Number(k):  # type: ignore[arg-type]
+        if not isinstance(call, Call) or call.op != "from_rotation_vector" or call.args[0] != Number(Fraction(k)):
             return None
     first = found[0]
     assert isinstance(first, Call)

@@ -14,7 +14,7 @@ from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 
-__all__ = ["Attitude", "Dual", "Evaluator", "Gradient", "attitudes", "held_attitudes", "seeds", "state_seeds", "state_values"]
+__all__ = ["Attitude", "Dual", "Evaluator", "attitudes", "held_attitudes", "seeds", "state_seeds", "state_values"]
 
 class Evaluator:
     """Evaluates expressions of a model at given duals; definitions are evaluated when first needed.

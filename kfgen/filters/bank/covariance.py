@@ -106,8 +106,8 @@ class BankCovariance:
             for step, start in ((1, n), (n, 1)):  # rows, then columns
                 with t.loop("k", 0, n) as k:
                     old = [t.name(own[k * step + i * start], "old") for i in index]
-                    for i in index:
-                        own[k * step + i * start] = t.value(dot([J[i][j] for j in index], list(old)))
+                    for a in index:
+                        own[k * step + a * start] = t.value(dot([J[a][b] for b in index], list(old)))
         with t.loop("k", 0, n * n) as k:
             t.store("P", k, t.element("P", k) + m * own[k])
 

@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import sympy
-
-from kfgen.filters.algebra.dual import Dual, Evaluator
 from kfgen.filters.algebra.numbers import Number, assume_positive, is_zero, select
 from kfgen.filters.bank.covariance import BankCovariance
 from kfgen.filters.bank.loops import Source, mixed_in_loops
 from kfgen.filters.bank.mixing import Estimate, mixed, normalised, seen_from_mean, spread, transition
 from kfgen.filters.bank.mode import Mode
+from kfgen.filters.bank.switching import switching
 from kfgen.filters.bank.trace import BankTrace, Scope
 from kfgen.filters.base import KF, Block, FilterCode, ModeNote
 from kfgen.filters.frame import guards
@@ -26,7 +24,6 @@ from kfgen.filters.kinds.single import LONG_FUNCTIONS, SingleFilter
 from kfgen.filters.steps import process
 from kfgen.filters.steps.gate import gate, store_outcome
 from kfgen.filters.steps.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
-from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.sensor import used_errors
 from kfgen.filters.steps.state import NIS, StateCode
 from kfgen.ir.program import Function
@@ -135,7 +132,7 @@ class Imm:
         scopes = [mode.scope() for mode in self.modes]
         mu = self._mu(t)
         t.section("probabilities after a switch, and of the mode before, given the mode now")
-        w, c = transition(t, self.transition(t, step), mu)
+        w, c = transition(t, switching(t, self.bank, step), mu)
         for mode, value in zip(self.modes, c, strict=True):
             t.name(value, f"c_{mode.name}")
         for i, before in enumerate(self.modes):
@@ -159,24 +156,6 @@ class Imm:
         guards.settled(t, self.model)
         names = taken | {a.name for a in arguments}
         return Function("predict", arguments, schedule(t, names), predict_doc(self.model))
-
-    def transition(self, t: BankTrace, step: Step) -> list[list[Value]]:
-        """M (B, B); rows that do not sum to 1 by what they are, are normalised."""
-        given = process.parameters_and_inputs(t, self.model, inputs=False)
-        if step.dt is not None:
-            given["dt"] = Dual(step.dt)
-        evaluator = Evaluator(t, self.model, given)
-        rows = [[evaluator.value(e) for e in row] for row in self.bank.transition]
-        sums = [sum(row[1:], row[0]) for row in rows]
-        exact = [sympy.expand(sum(row)) == 1 for row in self.bank.transition]
-        varying = [v for row in rows for v in row if v.constant is None]
-        guards.finite(t, varying)
-        empty = [total <= 0 for total, ok in zip(sums, exact, strict=True) if not ok]
-        guards.positive(t, [*(v < 0 for v in varying), *empty])
-        return [
-            row if ok else [v / assume_positive(total) for v in row]
-            for row, total, ok in zip(rows, sums, exact, strict=True)
-        ]
 
     def _mix_all(self, t: BankTrace, scopes: list[Scope], w: list[list[Number]]) -> None:
         """Have every mode start from its mixture."""

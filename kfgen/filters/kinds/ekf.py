@@ -7,21 +7,18 @@ update: see `sequence`. The filters that linearise otherwise are subclasses: iek
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 from kfgen.filters.algebra.linalg import Vector, dot, plus
 from kfgen.filters.algebra.numbers import assume_positive, is_positive, positive_within, require_nonnegative
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.noise import Additive, Given
-from kfgen.filters.covariance.parts import Learning, Motion
+from kfgen.filters.covariance.parts import Motion
 from kfgen.filters.frame import guards
 from kfgen.filters.kinds.single import SingleFilter
+from kfgen.filters.kinds.work import Learnt, Update
 from kfgen.filters.steps import process
-from kfgen.filters.steps.adapt import AdaptedR
-from kfgen.filters.steps.compensation import Rests
 from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.process import Advance, Prior, Step
 from kfgen.filters.steps.resetting import moving
@@ -33,38 +30,6 @@ from kfgen.model.model import SensorModel
 
 Final = Generator[Judged | Made, None, Updated[Any]]
 """Yields as Phases do, and returns the update that is made."""
-
-
-@dataclass
-class Update:
-    """What an update of one sensor works with. used: whether each component counts, where a mask tells."""
-
-    t: Trace
-    sensor: SensorModel
-    code: SensorCode
-    x: list[Value]  # in the spec's order
-    form: Form[Any]
-    used: list[Value] | None
-    adapted: AdaptedR | None
-    tested: list[Value] = field(default_factory=list)  # what else has to be finite
-    rests: Rests = field(default_factory=dict)  # of compensated states, after the update
-    turns: list[Turn] = field(default_factory=list)  # of the rotations, by the update
-    base: list[Value] | None = None  # the state about which the rotations are turned, if it is not x
-    apart: list[Value] | None = None  # base [-] x
-    free: list[Value] = field(default_factory=list)  # x after the update, before bounds
-
-    @cached_property
-    def P(self) -> Any:
-        """As it stands in the struct, read when it is first needed."""
-        return self.form.load(self.t)
-
-
-@dataclass
-class Learnt:
-    """What an update leaves for an adapted R (m,), and the next Q."""
-
-    residual: Vector = field(default_factory=list)
-    Q: Learning | None = None
 
 
 class Ekf(SingleFilter):
@@ -203,8 +168,8 @@ class Ekf(SingleFilter):
 
     def sequence(self, u: Update, innovation: Innovation, plain: bool, P: Any = None) -> Updated[Any]:
         """The components one by one. plain: the textbook's update. P: in place of that of the struct."""
-        names = list(u.sensor.errors)
-        return Sequence(u.t, self.model, self.form, names, plain, self.scalar.epsilon).run(u.P if P is None else P, innovation)
+        sequence = Sequence(u.t, self.model, self.form, list(u.sensor.errors), plain, self.scalar.epsilon)
+        return sequence.run(u.P if P is None else P, innovation)
 
     def judged(self, u: Update, innovation: Innovation, plain: Updated[Any]) -> Phases:
         """Guards, and then the gate, over the textbook's update. A far outlier may overflow nis and is gated all the

@@ -7,7 +7,8 @@ from typing import Any
 
 from kfgen.filters.algebra.linalg import dot, plus
 from kfgen.filters.algebra.numbers import is_zero
-from kfgen.filters.kinds.ekf import Ekf, Final, Update
+from kfgen.filters.kinds.ekf import Ekf, Final
+from kfgen.filters.kinds.work import Update
 from kfgen.filters.steps.resetting import moving
 from kfgen.filters.steps.sensor import Innovation
 from kfgen.filters.steps.sequence import Updated

@@ -29,7 +29,8 @@ def by_sensor(model: Model, sensor: SensorModel) -> tuple[str, ...]:
     names = [w.name for w in sensor.noises]
     if not names:
         return ()
-    return cloud.carried_by(model, _seen(model, sensor, turning=False), names, sensor.noise_covariance, model.spec.filter.augment)
+    seen = _seen(model, sensor, turning=False)
+    return cloud.carried_by(model, seen, names, sensor.noise_covariance, model.spec.filter.augment)
 
 
 def images_of_process(model: Model) -> Space:

@@ -163,11 +163,15 @@ def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], tak
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("x", n + k), name)
     evaluator = Evaluator(t, model, _duals(t, model, _state(t, model, used), noises, used))
-    z = [evaluator.value(e) for e in sensor.h]
+    turning = {r.first + k for r in sensor.rotations for k in range(4)}
+    z: list[Dual] = []
+    for i, e in enumerate(sensor.h):
+        z.append(Dual(evaluator.value(e)))
+        if i not in turning:
+            t.store("z", i, z[i].value)
     for r in sensor.rotations:
-        z[r.first : r.first + 4] = predicted_attitude(evaluator, sensor, r, [Dual(v) for v in z]).q
-    for i, value in enumerate(z):
-        t.store("z", i, value)
+        for k, value in enumerate(predicted_attitude(evaluator, sensor, r, z).q):
+            t.store("z", r.first + k, value)
     point = Argument("x", "{name}_real_t", pointer=True, size=n + len(carried))
     out = Argument("z", "{name}_real_t", pointer=True, constant=False, size=len(sensor.h))
     body = schedule(t, taken | {"kf", "u", "x", "z"})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -13,30 +13,19 @@ from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Solving
 from kfgen.filters.covariance.noise import Given
 from kfgen.filters.frame import guards
-from kfgen.filters.kinds.ekf import Update
+from kfgen.filters.kinds.work import Update
 from kfgen.filters.sigma import cloud
 from kfgen.filters.sigma.carried import images_of_sensor
 from kfgen.filters.sigma.cloud import Private
 from kfgen.filters.sigma.drawing import Drawing, noise_root
 from kfgen.filters.sigma.points import PointSet
+from kfgen.filters.sigma.turned import Seen, mean_of, seen_spread
 from kfgen.filters.steps.sensor import Linearised, SensorCode, total
-from kfgen.geometry import Turn
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
-
-
-@dataclass(frozen=True)
-class Seen:
-    """Of a measurement of m errors: z (of all components), its covariance without R (m, m), that with the state (n, m) and with the carried
-    noises (q, m)."""
-
-    z: Vector
-    spread: Symmetric
-    cross: Rows
-    noise: Rows
 
 
 class Seeing:
@@ -166,14 +155,14 @@ class Seeing:
                 for (a, b), variable in spread.items():
                     term = d[a] * d[b] if points.uniform else wc * d[a] * d[b]
                     variable.set(variable.get() + term)
-        mean, seen_from = self._mean(t, base, delta)
+        mean, seen_from = mean_of(t, self.images, base, delta)
         for a, value in enumerate(mean):
             t.store("seen", a, value)
         first_entry = len(sensor.h)
         whole_spread = {(a, b): variable.get() * scale_c + delta[a] * delta[b] * points.extra
                         for (a, b), variable in spread.items()}  # fmt: skip
         moved_cross: dict[tuple[int, int], Value] = {}
-        for (a, b), value in self._seen_spread(t, whole_spread, seen_from).items():
+        for (a, b), value in seen_spread(t, whole_spread, seen_from).items():
             t.store("seen", first_entry + b * (b + 1) // 2 + a, value)
         offset = first_entry + m * (m + 1) // 2
         for (i, a), variable in cross.items():
@@ -196,30 +185,6 @@ class Seeing:
         body = schedule(t, taken | {"kf", "u", "x", "z", "middle", "cloud", "seen"})
         doc = f"what the points predict of {sensor.name}: mean, covariance, covariances with the state"
         return cloud.private(f"{'recall' if self.recalls else 'see'}_{sensor.name}", body, arrays, doc)
-
-    def _mean(self, t: Trace, base: list[Value], delta: Vector) -> tuple[list[Value], Rows | None]:
-        """base [+] delta, and how deviations are seen from there (m, m), where that is another way."""
-        mean = list(base)
-        for i, j, _ in self.images.singles:
-            mean[i] = base[i] + delta[j]
-        if not self.images.rotations:
-            return mean, None
-        T: Rows = [[t.one if i == j else t.zero for j in range(self.m)] for i in range(self.m)]
-        for i, j, rotation in self.images.rotations:
-            turn = Turn(delta[j : j + 3])
-            mean[i : i + 4] = rotation.turned(base[i : i + 4], turn)
-            for k, row in enumerate(rotation.moved(turn)):
-                T[j + k][j : j + 3] = row
-        return mean, T
-
-    def _seen_spread(
-        self, t: Trace, spread: dict[tuple[int, int], Value], T: Rows | None
-    ) -> dict[tuple[int, int], Value]:
-        if T is None:
-            return spread
-        whole = Symmetric(self.m, lambda a, b: spread[a, b])
-        columns = [whole.times(row) for row in T]
-        return {(a, b): t.value(linalg.dot(T[a], columns[b])) for a, b in spread}
 
     # in the update -----------------------------------------------------------------------------------
 

@@ -15,7 +15,8 @@ from kfgen.filters.base import KF, Block
 from kfgen.filters.covariance.base import Form, Solving
 from kfgen.filters.covariance.kernels.function import Kernels
 from kfgen.filters.covariance.kernels.updates import absorb_one
-from kfgen.filters.kinds.ekf import Ekf, Learnt, Update
+from kfgen.filters.kinds.ekf import Ekf
+from kfgen.filters.kinds.work import Learnt, Update
 from kfgen.filters.sigma import cloud
 from kfgen.filters.sigma.carried import by_process, by_sensor, images_of_process
 from kfgen.filters.sigma.drawing import FROM, Drawing

@@ -25,9 +25,11 @@ from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.motion import Moved
 from kfgen.filters.covariance.parts import Removal
 from kfgen.filters.frame import guards
-from kfgen.filters.kinds.ekf import Ekf, Update
+from kfgen.filters.kinds.ekf import Ekf
+from kfgen.filters.kinds.work import Update
 from kfgen.filters.sigma.innovation import Factored, Trust, factored, known_squares, pivots
-from kfgen.filters.sigma.seeing import Seeing, Seen
+from kfgen.filters.sigma.seeing import Seeing
+from kfgen.filters.sigma.turned import Seen
 from kfgen.filters.steps.gate import chi2_threshold
 from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated, masked

@@ -39,8 +39,8 @@ class Advance:
     """x (of all states), F (n, n), Q (n, n) and the noise columns (w, d) of their n errors: P <- F P F^T + Q + sum of
     d w w^T. Spec's order.
 
-    errors: of x, with their derivatives. after: x with its derivatives. added: what of Q comes from noise densities. steps: by what x moves, of those states
-    of which that is asked for.
+    errors: of x, with their derivatives. after: x with its derivatives. added: what of Q comes from noise densities.
+    steps: by what x moves, of those states of which that is asked for.
     """
 
     x: list[Value]

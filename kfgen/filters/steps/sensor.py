@@ -27,7 +27,8 @@ class Linearised:
     """Of an innovation of m errors at some x: h and z [-] h (m,), H (m, n), the additive R (m, m), and `added` (m, m):
     what else is uncertain, M Re M^T of the noise inputs. H's columns are in the order that was asked for.
 
-    predicted: of a quaternion the errors, without a value. computed: `added` is positive semidefinite by what it is, but for rounding.
+    predicted: of a quaternion the errors, without a value. computed: `added` is positive semidefinite by what it is,
+    but for rounding.
     """
 
     predicted: list[Dual]

@@ -80,9 +80,9 @@ class ByFactors(Looped):
 
         def weight(k: int | Value) -> Value:
             if not self.rooted:
-                return diagonal[k]
+                return t.value(diagonal[k])
             first = isinstance(k, int) and k == 0  # its column is taken as a unit vector
-            return diagonal[0] * diagonal[0] if first else t.one
+            return t.value(diagonal[0] * diagonal[0]) if first else t.one
 
         self.absorber.turn(space, T, Q, noise, column_of, weight)
         return self._turned(P)
