@@ -25,7 +25,7 @@ from kfgen.filters.covariance.parts import GainChange
 from kfgen.filters.frame.shared import unused
 from kfgen.filters.kinds.single import SingleFilter
 from kfgen.filters.kinds.steady import Steady
-from kfgen.filters.order import best_order
+from kfgen.filters.order import best_order, upper_order
 from kfgen.filters.steps import process
 from kfgen.filters.steps.sensor import SensorCode
 from kfgen.ir.nodes import Constants, Table
@@ -227,6 +227,11 @@ def _order(models: tuple[Model, ...]) -> list[int]:
                 touched = {j for j in range(n) if not is_zero(row[j])}
                 if model is models[0] or touched not in measured:
                     measured.append(touched)
+    if models[0].rotations:
+        blocks = [range(r.first_error, r.first_error + 3) for r in models[0].rotations]
+        found = upper_order(F, blocks)
+        if found is not None:
+            return found
     return best_order(F, noisy, measured)
 
 

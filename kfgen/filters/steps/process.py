@@ -10,6 +10,7 @@ from kfgen.filters.algebra.exact import discretise
 from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_positive, is_zero, require_nonnegative
+from kfgen.filters.steps.isotropic import separated, turned_back
 from kfgen.filters.steps.motion import compensated, errors_of, integrate, rates_of_errors, stepped
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
@@ -160,6 +161,8 @@ def advance(
     F = [[d.gradient.get(name, t.zero) for name in model.errors] for d in errors]
     noise = _columns(t, model, errors, [w for w in held if w not in carried], Qw, None) + extra
     assert len(F) == n
+    if model.rotations:
+        Q, noise = separated(Q, turned_back(t, noise, at_prior.attitudes.values()))
     return Advance([d.value for d in after], F, Q, noise, after, errors, added, steps)
 
 
