@@ -74,7 +74,7 @@ class Drive:
         player.begin(leg.fresh, leg.parameters)
         truth.begin(random)
         truth.memory.numbers.update({f"kf.parameters.{name}": value for name, value in leg.parameters.items()})
-        off = [a - float(b) for a, b in zip(truth.x, self.model.x0, strict=True)] if leg.fresh else [0.0] * n
+        off = [a - float(b) for a, b in zip(truth.x, self.model.x0, strict=True)] if leg.fresh else [0.0] * truth.nx
         truth.place(leg.x, [0.0] * n)
         self._place(player, [a + e for a, e in zip(leg.x, off, strict=True)])
         mode = k % self.weather.modes

@@ -62,9 +62,10 @@ class Truth:
         sensor = model.sensors[k]
         code = SensorCode(t, model, sensor, list(range(self.n)))
         linear = code.linearise(code.prior())
-        R, m = total(linear), len(sensor.h)
+        R, m = total(linear), sensor.dimension
+        for i, value in enumerate(code.predicted(code.prior())):
+            t.store("out.z", i, value)
         for i in range(m):
-            t.store("out.z", i, linear.predicted[i].value)
             for j in range(m):
                 t.store("out.R", i * m + j, t.value(R[i][j]))
         return Function(f"see_{b}_{k}", [], schedule(t), "", returns="void")
