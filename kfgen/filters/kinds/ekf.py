@@ -89,6 +89,7 @@ class Ekf(SingleFilter):
         """The update of the estimate in the struct. used: whether each component counts, where a mask tells."""
         t.section("innovation")
         code = SensorCode(t, self.model, sensor, self.order, self.derivatives, self.skipped(sensor))
+        code.counts = used
         u = Update(t, sensor, code, code.prior(), self.form, used, self.adapted_R(sensor))
         linear = self.compensation.corrected(t, self.linearise(u), self.order)
         innovation = self.innovation(u, linear)

@@ -45,6 +45,7 @@ def whole_vector(
     model, form = ukf.model, ukf.form
     t.section("innovation")
     code = SensorCode(t, model, sensor, ukf.order, skipped=seeing.carried)
+    code.counts = used
     u = Update(t, sensor, code, code.prior(), form, used, ukf.adapted_R(sensor))
     failures: list[Value] = []
     array = out = None

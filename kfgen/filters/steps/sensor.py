@@ -61,6 +61,7 @@ class SensorCode:
     def __init__(self, t: Trace, model: Model, sensor: SensorModel, order: list[int], derivatives: int = 1,
                  skipped: tuple[str, ...] = ()) -> None:  # fmt: skip
         self.skipped = skipped
+        self.counts: list[Value] | None = None  # whether each entry of the innovation does, where a mask tells
         self.t = t
         self.model = model
         self.sensor = sensor
@@ -163,7 +164,12 @@ class SensorCode:
     def measured(self, r: RotationModel) -> list[Value]:
         """A measured quaternion, whatever its norm is."""
         t = self.t
-        z = guards.quaternion(t, [t.field(f"z.{part}") for part in r.parts])
+        z = [t.field(f"z.{part}") for part in r.parts]
+        if self.counts is not None:  # what does not count may be anything
+            z = [t.select(self.counts[r.first_error], a, int(k == 0)) for k, a in enumerate(z)]
+        for a in z:
+            t.guard(~t.finite(a), "NOT_FINITE")
+        z = guards.quaternion(t, z)
         return [t.name(a, f"z_{part}") for a, part in zip(r.geometry.normalised(z), r.parts, strict=True)]
 
     def _noise(self, evaluator: Evaluator, predicted: list[Dual]) -> Rows:

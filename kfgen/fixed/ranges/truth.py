@@ -79,6 +79,8 @@ class Truth:
         model, n = self.model, self.n
         arrays = {"kf.x": [], "out.x": [0.0] * self.nx, "out.Q": [0.0] * n * n}
         self.memory = Memory(arrays, {"kf.steps": 0, "kf.t": 0.0})
+        for sensor in model.sensors:  # of a quaternion that is tested, though what is measured is yet to be drawn
+            self.memory.numbers |= {f"z.{part}": 1.0 for r in sensor.rotations for part in r.parts}
         self.now = 0.0
         for name, number in model.parameters:
             self.memory.numbers[f"kf.parameters.{name}"] = float(number)
