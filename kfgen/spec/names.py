@@ -54,7 +54,8 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
     """Every identifier that the emitted code declares: (identifier, what it is, where it comes from)."""
     lower, upper = spec.name, spec.name.upper()
     own = spec.place
-    for word in ("NX", *(("NE",) if spec.rotations else ()), *(("NU",) if spec.inputs else ()), *(("NB",) if spec.imm else ())):
+    sizes = {"NX": True, "NE": bool(spec.rotations), "NU": bool(spec.inputs), "NB": spec.imm is not None}
+    for word in (word for word, there in sizes.items() if there):
         yield f"{upper}_{word}", "a size", own
     for word in STATUS:
         yield f"{upper}_{word}", "a status", own

@@ -103,7 +103,8 @@ def _noises(mode: Spec) -> Iterator[Advice]:
         whole = Whole(sensor.groups)
         for noise in sensor.noise:
             if not whole.parts(noise.name) & seen:
-                text = f"the noise {short(whole.name(noise.name))} stands in no h of {short(sensor.name)}, so it does nothing"
+                name = short(whole.name(noise.name))
+                text = f"the noise {name} stands in no h of {short(sensor.name)}, so it does nothing"
                 yield Advice(noise.place, text, "write it into h, or as `std` of a component", "unused_noise")
 
 

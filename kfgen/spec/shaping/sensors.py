@@ -188,7 +188,7 @@ class SensorShaper:
 
         tree = part.tree if part.tree == BAD else renamed(part.tree)
         if crossing:
-            text = f"part {i + 1} of the residual uses other parts of z or h than its own"
+            text = "a part of the residual uses other parts of z or h than its own"
             self.problems.add(part.place, text, "write a residual that works part by part")
             tree = BAD
         found = replace(part, tree=tree)
