@@ -54,7 +54,8 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
     """Every identifier that the emitted code declares: (identifier, what it is, where it comes from)."""
     lower, upper = spec.name, spec.name.upper()
     own = spec.place
-    for word in ("NX", *(("NU",) if spec.inputs else ()), *(("NB",) if spec.imm else ())):
+    sizes = {"NX": True, "NE": bool(spec.rotations), "NU": bool(spec.inputs), "NB": spec.imm is not None}
+    for word in (word for word, there in sizes.items() if there):
         yield f"{upper}_{word}", "a size", own
     for word in STATUS:
         yield f"{upper}_{word}", "a status", own
@@ -74,6 +75,8 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
         yield f"{lower}_{word}", "a function", own
     for state in spec.states:
         yield f"{upper}_{state.name.upper()}", f"the index of the state `{state.name}`", state.place
+    for error in spec.errors if spec.rotations else ():
+        yield f"{upper}_ERROR_{error.upper()}", f"the index of the error coordinate `{error}`", own
     for sensor in spec.measurements:
         yield f"{upper}_NZ_{sensor.name.upper()}", f"the size of the sensor `{sensor.name}`", sensor.place
         yield f"{lower}_{sensor.name}_t", f"the type of the sensor `{sensor.name}`", sensor.place

@@ -215,7 +215,11 @@ class Scopes:
             hint = "numbers are finite"
         elif name.lower() in ("true", "false"):
             hint = "booleans are not numbers"
-        if hint:
+        owner = next((s.name for s in context.sensors if name in context.sensor_names(s.name)), None)
+        if owner is not None:
+            text = f"{short(name)} is an input of the sensor {short(owner)}, and known in its h, R and gate alone"
+            self._say(written, name, text, "declare it under `inputs` of the sensor that it comes with")
+        elif hint:
             self._say(written, name, f"the name {short(name)} is not known", hint)
         else:
             self.unknown.setdefault(name, []).append(self._where(written, name))

@@ -36,8 +36,8 @@ class Builder:
         rotations = self.model.rotations(raw, covered="P0" in top)
         errors = error_names((state.name for state in states), rotations)
         noise = self.model.noises(top.get("noise"), "noise_covariance" in top)
-        self.values.both(top, "P0", top.get("states"), raw)
-        self.values.both(top, "noise_covariance", top.get("noise"))
+        self.values.both(top, "P0", self.shaper.top.get("states"))
+        self.values.both(top, "noise_covariance", self.shaper.top.get("noise"))
         imm = top.get("imm")
         spec = Spec(
             name=top.get("name", ""),

@@ -30,8 +30,14 @@ def check(facts: Facts) -> None:
             for variance in [*variances, *(v for r in sensor.rotations for v in r.variances)]:
                 _variance(facts, variance, known)
             if sensor.R is not None:
-                _matrix(facts, sensor.R, names, "component", f"{path}.R", model.context, known)
+                of = "coordinate of the residual" if sensor.rotations else "component"
+                _matrix(facts, sensor.R, names, of, f"{path}.R", model.context, known)
             _noises(facts, sensor.noise, sensor.noise_covariance, f"{path}.noise_covariance", model.context)
+
+
+def _coordinate(model: Model) -> str:
+    """What P has one row for; a quaternion has three of the error."""
+    return "error coordinate" if model.rotations else "state"
 
 
 def _variance(facts: Facts, expression: Expression | None, known: Known) -> Value | None:
@@ -60,7 +66,7 @@ def _initial(facts: Facts, model: Model) -> None:
     known = facts.folded
     if model.P0 is not None:
         path = f"{model.prefix}P0" if facts.written(f"{model.prefix}P0") else "P0"
-        _matrix(facts, model.P0, names, "state", path, model.context, known)
+        _matrix(facts, model.P0, names, _coordinate(model), path, model.context, known)
         return
     variances = {name: _variance(facts, variance, known) for name, variance in model.variances.items()}
     seen: dict[frozenset[str], Place] = {}
@@ -86,7 +92,8 @@ def _initial(facts: Facts, model: Model) -> None:
     if not complete or not entries:
         return
     rows = [[variances[a] if a == b else entries.get((a, b), Fraction(0)) for b in names] for a in names]
-    place = facts.at(f"{model.prefix}covariances", "covariances")
+    first = model.covariances[0].value.place
+    place = facts.at(f"{model.prefix}covariances", "covariances", otherwise=first)
     hint = "make the covariances smaller: |c| <= std1*std2"
     _semidefinite(facts, rows, names, place, "the initial covariance", hint)
 
@@ -96,7 +103,7 @@ def _process(facts: Facts, model: Model) -> None:
     Q = model.dynamics.Q
     if isinstance(Q, tuple):
         names = list(model.errors)
-        _matrix(facts, Q, names, "state", f"{model.dynamics.place.path}.Q", model.context, known)
+        _matrix(facts, Q, names, _coordinate(model), f"{model.dynamics.place.path}.Q", model.context, known)
     else:
         for expression in Q.values():
             _variance(facts, expression, known)
@@ -132,7 +139,8 @@ def _matrix(facts: Facts, matrix: Matrix, names: list[str], of: str, path: str, 
             facts.add(at, text, f"write {size} rows of {size} numbers")
             return
     if len(matrix) != size or len(matrix[0]) != size:
-        plural = of + "s" if size != 1 else of
+        head, _, tail = of.partition(" of ")
+        plural = of if size == 1 else f"{head}s of {tail}" if tail else f"{head}s"
         text = f"`{key}` is {len(matrix)} x {len(matrix[0]) if matrix else 0}, but there are {size} {plural}"
         facts.add(place, text, f"write {size} rows of {size} numbers, in the order {', '.join(names[:8])}")
         return

@@ -21,7 +21,7 @@ def check(facts: Facts) -> None:
         chosen = model.filter
         _excluded(facts, chosen)
         _consider(facts, model)
-        if chosen.type == "kf":
+        if chosen.type == "kf" and not model.rotations:
             _linear(facts, model)
         if chosen.gain == "steady" and facts.spec.imm is None:
             _steady(facts, model)

@@ -24,7 +24,7 @@ def check(facts: Facts) -> None:
             _reset(facts, model, rotation)
             _init(facts, model, rotation)
         for sensor in model.measurements:
-            for rotation in sensor.rotations:
+            for rotation in () if model.rotations else sensor.rotations:
                 _type(facts, model, rotation, f"the measured quaternion {short(rotation.name)}")
 
 

@@ -32,13 +32,19 @@ class Definitions:
         for name in let.values:
             known.pop(name, None)
         out: list[tuple[str, Extent, tuple[str, ...]]] = []
-        for name in _ordered(let):
+        order, circles = _ordered(let)
+        self.reader.symbols.unsure |= {name for circle in circles for name in circle}
+        for name in order:
             value = self.reader.value(let.values[name])
             found[name] = value
             extent = NUMBER if value.bad else value.extent
             parts = self.vectors.names(name, extent)
             out.append((name, extent, parts))
             known[name] = self.vectors.shaped(extent, parts, ())  # for those that follow
+        for circle in circles:
+            if any(found[name].bad for name in circle):
+                text = "the definitions use each other in a circle: " + " -> ".join([*circle, circle[0]])
+                self.reader.problems.add(let.values[circle[0]].place, text, "break the circle")
         return out
 
     def flat(self, path: Path) -> Fields:
@@ -55,27 +61,32 @@ class Definitions:
         return flat
 
 
-def _ordered(let: Fields) -> list[str]:
-    """Names in an order in which each uses only those before it, as far as there is one."""
+def _ordered(let: Fields) -> tuple[list[str], list[list[str]]]:
+    """Names in an order in which each uses only those before it, as far as there is one; and the circles."""
     uses: dict[str, list[str]] = {}
     for name, raw in let.values.items():
         if raw is not None:
             uses[name] = [n for n in dict.fromkeys(_names(raw)) if n in let.values]
     order: list[str] = []
+    circles: list[list[str]] = []
     done: set[str] = set()
     for start in uses:
-        stack = [(start, iter(uses[start]))] if start not in done else []
+        stack = [] if start in done else [(start, list(uses[start]))]
         done.add(start)
         while stack:
             name, rest = stack[-1]
-            following = next((n for n in rest if n not in done and n in uses), None)
-            if following is None:
+            if not rest:
                 order.append(name)
                 stack.pop()
-            else:
+                continue
+            following = rest.pop(0)
+            waiting = [n for n, _ in stack]
+            if following in waiting:
+                circles.append(waiting[waiting.index(following) :])
+            elif following in uses and following not in done:
                 done.add(following)
-                stack.append((following, iter(uses[following])))
-    return order
+                stack.append((following, list(uses[following])))
+    return order, circles
 
 
 def _names(raw: object) -> list[str]:

@@ -165,7 +165,7 @@ def triad(a: Shaped, b: Shaped, ra: Shaped, rb: Shaped, share: Share) -> Shaped:
     axis = share(column(unit(share(three("triad", ra)).parts, share))).parts
     u = _across(share(rotate(first, b, share)).parts, axis, share)
     v = _across(rb.parts, axis, share)
-    return product(share(_turned(u, v, axis, share)), first)
+    return product(share(_about(u, v, axis, share)), first)
 
 
 def _across(v: Sequence[Tree], axis: Sequence[Tree], share: Share) -> tuple[Tree, ...]:
@@ -184,6 +184,20 @@ def _turned(u: Sequence[Tree], v: Sequence[Tree], axis: Sequence[Tree], share: S
     root = share(number(Call("sqrt", (size,)))).number
     pairs = zip((w, *turn), (ZERO, *axis), strict=True)
     return Shaped(ROTATION, tuple(Call("where", (far, Call("div", (p, root)), q)) for p, q in pairs))
+
+
+def _about(u: Sequence[Tree], v: Sequence[Tree], axis: Sequence[Tree], share: Share) -> Shaped:
+    """The rotation about an axis that takes u to v, as far as it can: u and v may be round-off, where nothing tells."""
+    w = share(number(add(ONE, inner(u, v)))).number
+    crossed = [sub(mul(u[i], v[j]), mul(u[j], v[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
+    s = share(number(inner(axis, crossed))).number
+    size = share(number(add(square(w), square(s)))).number
+    far = Call("gt", (size, _OPPOSITE))
+    root = share(number(Call("sqrt", (size,)))).number
+    none = sub(ONE, inner(axis, axis))  # 1 where there is no axis
+    cosine = Call("where", (far, Call("div", (w, root)), none))
+    sine = share(number(Call("where", (far, Call("div", (s, root)), ONE)))).number
+    return Shaped(ROTATION, (cosine, *(mul(sine, p) for p in axis)))
 
 
 def unit(parts: Sequence[Tree], share: Share) -> tuple[Tree, ...]:

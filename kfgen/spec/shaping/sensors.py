@@ -131,10 +131,13 @@ class SensorShaper:
             return NUMBER, (name,), ()
         value = self.reader.value(raw, local)
         extent = NUMBER if value.bad else value.extent
+        if value.bad:
+            self.reader.symbols.unsure.add(name)
         own = value.suffixes
         if extent.kind == "matrix":
             self.problems.add(raw.place, f"h of {short(name)} is {extent}", "write a number, a vector or a quaternion")
             extent = NUMBER
+            f.values["h"] = Expression(BAD, "", raw.place)
         if f.get("kind") == "quaternion" and extent != ROTATION and not value.bad:
             if extent.kind == "vector" and extent.rows == 4:
                 extent, own = ROTATION, ()
@@ -185,7 +188,7 @@ class SensorShaper:
 
         tree = part.tree if part.tree == BAD else renamed(part.tree)
         if crossing:
-            text = f"part {i + 1} of the residual uses other parts of z or h than its own"
+            text = "a part of the residual uses other parts of z or h than its own"
             self.problems.add(part.place, text, "write a residual that works part by part")
             tree = BAD
         found = replace(part, tree=tree)

@@ -81,6 +81,8 @@ class Shaper:
                 continue
             value = self.reader.value(written)
             names = self.vectors.names(name, value.extent)
+            if value.bad:
+                self.symbols.unsure.add(name)
             if not (value.bad or value.unknown) or value.extent == NUMBER:
                 self._know(name, "constant", value.extent, names, (), found, raw)
             for part, expression in zip(names, value.parts, strict=True):

@@ -30,7 +30,7 @@ class StartShaper:
             written = raw.get(key)
             if isinstance(written, Fields):
                 flat.values[key], _ = self.targets.table(
-                    written, errors, key, whole=not errors, local=local, own=own, spread=errors
+                    written, errors, key, whole=not errors, local=local, own=own
                 )
         flat.values["let"] = tuple(own)
         return flat

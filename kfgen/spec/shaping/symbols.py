@@ -22,6 +22,7 @@ class Symbols:
         self.taken = {name.upper() for name in taken}
         self.hidden: dict[Path, list[Definition]] = {}  # first keys of a path -> definitions
         self.count = 0
+        self.unsure: set[str] = set()  # names whose declaration is a mistake that has been reported
 
     def fresh(self, stem: str) -> str:
         """A name that nothing has yet."""
@@ -52,6 +53,7 @@ class Here:
 
     def value(self, name: str) -> Shaped:
         found = self.local.get(name) or self.symbols.known.get(name)
+        self.unknown = self.unknown or name in self.symbols.unsure
         if found is None:
             self.unknown = self.unknown or not self.plain(name)
             return number(Name(name))

@@ -63,12 +63,11 @@ class TargetReader:
 
     def table(
         self, written: Fields, errors: bool, key: str, whole: bool = False, local: Local | None = None,
-        own: list[Definition] | None = None, spread: bool = True,
+        own: list[Definition] | None = None,
     ) -> tuple[Fields, dict[str, tuple[tuple[Expression, ...], ...]]]:  # fmt: skip
         """By part; and the blocks of vectors that were written as matrices, by their first part.
 
-        errors: a quaternion has its three errors here; whole: it may not be named by its parts. spread: a number stands
-        for all parts of a vector.
+        errors: a quaternion has its three errors here; whole: it may not be named by its parts.
         """
         found = replace(written, values={}, places={})
         blocks: dict[str, tuple[tuple[Expression, ...], ...]] = {}
@@ -78,7 +77,7 @@ class TargetReader:
             if targets is None:
                 found.values[name], found.places[name] = self.reader.plain(raw, local), place
                 continue
-            values = self.values(name, raw, targets, errors, key, blocks, local, own, spread)
+            values = self.values(name, raw, targets, errors, key, blocks, local, own)
             for target, value in zip(targets, values, strict=True):
                 if target in found.values:
                     text = f"{short(target)} is given here, and by another name too"
@@ -102,25 +101,31 @@ class TargetReader:
 
     def values(
         self, name: str, raw: Any, targets: tuple[str, ...], errors: bool, key: str, blocks: dict[str, Any],
-        local: Local | None, own: list[Definition] | None, spread: bool,
+        local: Local | None, own: list[Definition] | None,
     ) -> tuple[Any, ...]:  # fmt: skip
         if raw is None:
             return (None,) * len(targets)
         extent = self.states.extent(name, errors)
-        n = len(targets)
+        n, spread = len(targets), True
         value = self.reader.value(raw, local, own)
         square = key in ("Q",) and value.extent == matrix(n, n) and extent != NUMBER and not value.bad
         if square:
             blocks[targets[0]] = tuple(value.parts[i * n : (i + 1) * n] for i in range(n))
             return tuple(value.parts[i * n + i] for i in range(n))
-        what = f"`{key}` of {short(name)} is {extent}"
+        what = f"{short(name)} is {extent}" if key == "states" else f"`{key}` of {short(name)} is {extent}"
         listed = ", ".join(targets[:8])
         hint = "write one number" if extent == NUMBER else f"write a list: {listed}"
-        if extent == ROTATION:
+        if key == "f" and name in self.states.errors:
             hint = "write the new quaternion, such as `q*from_rotation_vector(rate*dt)`"
-        elif key == "f" and errors and name in self.states.errors:
-            hint = "write the body's angular rate, a 3-vector in rad/s"
-        return self.reader.fit(value, raw.place, extent, what, hint, spread and extent != ROTATION)
+            if errors:
+                hint = "write the body's angular rate, a 3-vector in rad/s"
+            spread = False
+        elif extent == ROTATION and key == "states":
+            hint = "write a quaternion, such as `triad(a, b, ra, rb)` or `rotation_between(a, b)`"
+            spread = False
+        if name in self.reader.symbols.unsure:
+            value.unknown = True
+        return self.reader.fit(value, raw.place, extent, what, hint, spread)
 
     def words(self, words: Any, errors: bool) -> tuple[Any, ...]:
         """A list of states, each whole or a part."""

@@ -64,7 +64,10 @@ class VectorReader:
             return self._named(name, f, written)
         if isinstance(written, Expression):
             size = self._size(written)
-            return (vector(size), ()) if size is not None else (NUMBER, ())
+            if size is not None:
+                return vector(size), ()
+        if "vector" in f:
+            self.reader.symbols.unsure.add(name)
         return NUMBER, ()
 
     def _size(self, written: Expression) -> int | None:
@@ -78,6 +81,7 @@ class VectorReader:
     def _named(self, name: str, f: Fields, written: tuple[Any, ...]) -> tuple[Extent, tuple[str, ...]]:
         parts = tuple(part for part in written if part is not None)
         place = self.walker.value_place(f"{f.place.path}.vector", f.place)
+        self.reader.symbols.unsure.add(name)
         if not written:
             self.problems.add(place, "a vector without parts", "write `vector: 3`, or the names of its parts")
             return NUMBER, ()
@@ -93,6 +97,7 @@ class VectorReader:
         elif len(parts) > MOST_PARTS:
             self.problems.add(place, f"a vector has at most {MOST_PARTS} parts, not {len(parts)}", "split it")
         else:
+            self.reader.symbols.unsure.discard(name)
             return vector(len(parts)), parts
         return NUMBER, ()
 
@@ -150,7 +155,11 @@ class VectorReader:
             return tuple(value.parts[i * n + i] for i in range(n))
         if value.extent.kind == "matrix" and key in ("std", "root_density"):
             hint = f"a full covariance is written as `{'var' if key == 'std' else 'density'}`"
-        return self.reader.fit(value, raw.place, extent, what, hint, spread=extent != ROTATION)
+        value.unknown = value.unknown or found.name in self.reader.symbols.unsure
+        fitted = self.reader.fit(value, raw.place, extent, what, hint, spread=extent != ROTATION)
+        if fitted[0].tree == BAD and extent == NUMBER and key in ("init", "value"):
+            self.reader.symbols.unsure.add(found.name)
+        return fitted
 
     def _pair(self, found: Declared, key: str, raw: tuple[Any, ...]) -> tuple[Any, ...]:
         if any(end is None for end in raw):
