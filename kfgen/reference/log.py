@@ -90,6 +90,8 @@ def _measure(kf: Replayed, name: str, z: Vector, u: Vector | None, result: Run, 
     if not np.any(present) or not (sensor.partial or np.all(present)):
         return 0
     mask = sum(1 << i for i in range(sensor.m) if present[i]) if sensor.partial else None
+    if not sensor.chosen(mask):
+        return 0
     status = kf.update(name, z, u if sensor.takes_inputs else None, mask)
     if status < Status.ERROR:
         result.nis[name][row] = kf.nis
