@@ -223,16 +223,15 @@ class ErrorState:
         self.x = space.unit(space.plus(images[0], mean))
         self.P = T @ (self.wc * spread.T) @ spread @ T.T + self.Q
         self.P += 0 if augment else G @ self.Qw @ G.T
-        self.kept = images, spread @ T.T
+        self.kept = spread @ T.T
 
     def update_points(self, z, h, R, root, weights, reset=True, measured=None, kept=False, sequential=False):
         """With points drawn anew, or with those that predict has left; sequential: as a linear measurement by
         regression, without what the regression leaves."""
         space = self.space
         measured = measured or Space(len(z), ())
-        offsets = np.array(self.points(root, *weights))
-        at, offsets = self.kept if kept else ([space.plus(self.x, d) for d in offsets], offsets)
-        images = [h(point) for point in at]
+        offsets = self.kept if kept else np.array(self.points(root, *weights))
+        images = [h(space.plus(self.x, d)) for d in offsets]
         around = np.array([measured.minus(image, images[0]) for image in images])
         mean = self.wm @ around
         T = measured.reset(mean)
