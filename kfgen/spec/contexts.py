@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from kfgen.spec.raw import Path
 from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Definition, Sensor, Spec
 
@@ -69,3 +70,25 @@ class Context:
                 found |= {c.name for c in s.components} | {r.name for r in s.rotations}
                 found |= {g.name for g in s.groups if g.parts[0] in found}
         return frozenset(found)
+
+
+def place_words(path: Path) -> str:
+    """Where a formula stands, in words."""
+    keys = [part for part in path if not part.startswith("[")]
+    for part in reversed(keys):
+        if part in (
+            "Q",
+            "R",
+            "P0",
+            "h",
+            "f",
+            "residual",
+            "reject",
+            "noise",
+            "covariances",
+            "noise_covariance",
+        ):
+            return f"`{part}`"
+        if part in ("constants", "let", "dt", "parameters", "transition", "mu0"):
+            return f"`{part}`"
+    return f"`{keys[-1]}`"

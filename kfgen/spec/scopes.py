@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from kfgen.errors import Place
-from kfgen.spec.contexts import Context
+from kfgen.spec.contexts import Context, place_words
 from kfgen.spec.lexer import positions
 from kfgen.spec.names import wrong_name
 from kfgen.spec.problems import LIMIT, SHARED_STATES, did_you_mean, short, suggestion
@@ -67,10 +67,22 @@ class Scopes:
                     self.problems.add(place, text, "choose another one")
                 else:
                     names_here[name] = kind, place
+        self._sensor_inputs(taken)
         kinds = {context: {n: kind for n, (kind, _) in found.items()} for context, found in taken.items()}
         self.contexts[""] = Context(self.spec, self.spec.let, self.spec.measurements, kinds[""])
         for mode in modes:
             self.contexts[mode.name] = Context(self.spec, mode.let, mode.measurements, kinds[mode.name])
+
+    def _sensor_inputs(self, taken: dict[str, dict[str, tuple[str, Place]]]) -> None:
+        """Several sensors may have an input of one name, but it hides no name of the spec."""
+        for kind, name, place, path in self.walker.declared:
+            if kind != "input" or "measurements" not in path:
+                continue
+            for context in self._users(path, everywhere=True):
+                if name in taken[context]:
+                    other, where = taken[context][name]
+                    text = f"the name {short(name)} is already that of a {other} (line {where.line})"
+                    self.problems.add(place, text, "choose another one")
 
     def _users(self, path: Path, everywhere: bool = False) -> list[str]:
         """The contexts that use what stands at a path."""
@@ -266,25 +278,3 @@ class Scopes:
                 if path[:2] == ("imm", "modes") and "states" in path and not hint.startswith("did you mean"):
                     hint = SHARED_STATES
                 self.problems.add(word.place, f"there is no {of} {short(word.text)}", hint)
-
-
-def place_words(path: Path) -> str:
-    """Where a formula stands, in words."""
-    keys = [part for part in path if not part.startswith("[")]
-    for part in reversed(keys):
-        if part in (
-            "Q",
-            "R",
-            "P0",
-            "h",
-            "f",
-            "residual",
-            "reject",
-            "noise",
-            "covariances",
-            "noise_covariance",
-        ):
-            return f"`{part}`"
-        if part in ("constants", "let", "dt", "parameters", "transition", "mu0"):
-            return f"`{part}`"
-    return f"`{keys[-1]}`"

@@ -94,7 +94,11 @@ class Budget:
 class Reference:
     """The name of something declared elsewhere."""
 
-    of: str  # state | sensor | component
+    of: str  # state | error (a coordinate of the error, or a whole vector) | sensor
+
+    @property
+    def words(self) -> str:
+        return "state" if self.of == "error" else self.of
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,10 @@ class Table:
     of: str
     value: Shape
     declares: bool = False
+
+    @property
+    def words(self) -> str:
+        return Reference(self.of).words
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ class Walker(Findings):
                 word = Word(node.text, self.place(node, path))
                 self.references.append((shape, word, path))
                 return word
-            self.wrong(node, path, f"the name of a {shape.of}")
+            self.wrong(node, path, f"the name of a {shape.words}")
         elif isinstance(shape, Budget):
             return self.budget(node, path)
         return None
@@ -189,7 +189,7 @@ class Walker(Findings):
 
     def table(self, node: Node, shape: Table, path: Path) -> Fields | None:
         if not isinstance(node, Mapping):
-            self.wrong(node, path, f"a mapping ({shape.of}: value)")
+            self.wrong(node, path, f"a mapping ({shape.words}: value)")
             return None
         fields = Fields(self.keys.get(path_text(path)) or self.place(node, path), path)
         for key, value in node.items:
@@ -205,7 +205,8 @@ class Walker(Findings):
 
     def record(self, node: Node, shape: Record, path: Path) -> Fields:
         fields = Fields(self.keys.get(path_text(path)) or self.place(node, path), path)
-        if isinstance(node, Scalar) and shape.bare is not None and node.kind != "null":
+        bare = isinstance(node, Sequence) or (isinstance(node, Scalar) and node.kind != "null")
+        if bare and shape.bare is not None:  # a value alone
             key = shape.key(shape.bare)
             assert key is not None
             fields.values[shape.bare] = self.value(node, key.shape, path)

@@ -71,7 +71,21 @@ def _residual(facts: Facts, residual: Expression, model: Model) -> None:
 
 
 def _initialize(facts: Facts) -> None:
+    """Each sensor sets states of its own."""
+    sensors: set[str] = set()
+    states: dict[str, str] = {}
     for initialize in facts.spec.initialize:
-        path = f"{initialize.place.path}.states"
-        if not initialize.states and facts.empty(path):
-            facts.add(facts.at(path), "no state is set", "write `states: {px: x}`")
+        path = initialize.place.path
+        if not initialize.states and facts.empty(f"{path}.states"):
+            facts.add(facts.at(f"{path}.states"), "no state is set", "write `states: {px: x}`")
+        if initialize.sensor in sensors:
+            at = facts.at(f"{path}.from", otherwise=initialize.place)
+            text = f"the sensor {short(initialize.sensor)} stands twice in `initialize`"
+            facts.add(at, text, "set all its states in one entry")
+            continue
+        sensors.add(initialize.sensor)
+        for state, value in initialize.states.items():
+            other = states.setdefault(state, initialize.sensor)
+            if other != initialize.sensor and state not in facts.scopes.doubtful:
+                text = f"the state {short(state)} is set by {short(other)} already"
+                facts.add(value.place, text, "let one sensor set it")

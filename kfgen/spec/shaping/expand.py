@@ -136,7 +136,7 @@ class Expander:
         return Shaped(value.extent, parts, value.suffixes)
 
 
-_SPLIT = "split it with `let`"
+_SPLIT = "split it with `let`, or with constants"
 _SCALAR = frozenset(("add", "sub", "mul", "div", "pow", "neg", "lt", "le", "gt", "ge", "and", "or", "not"))
 _SIGNS = {"pow": "**", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
 

@@ -1,0 +1,172 @@
+"""From a spec to its symbolic model: every formula in the scope of its names, every constant by its exact value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+import sympy
+
+from kfgen.errors import Mistake, SpecError
+from kfgen.ir.lower import Lowering
+from kfgen.ir.trace import Trace
+from kfgen.model.first import build_firsts
+from kfgen.model.model import Model, NoiseModel, OutputModel, SensorModel
+from kfgen.model.options import INNOVATION, Options, build_gate, build_options
+from kfgen.model.start import initial_covariance
+from kfgen.model.symbolic import constants, to_sympy
+from kfgen.spec.sensors import filter_of
+from kfgen.spec.tree import Expression
+from kfgen.spec.types import Filter, Matrix, Noise, Sensor, Spec
+
+Symbolic = Any  # a SymPy expression
+
+
+def build_model(spec: Spec) -> Model:
+    """The model of a validated spec.
+
+    Raises SpecError for what only algebra can tell (an equation of a kf that is not linear, ...).
+    """
+    return _Builder(spec).build()
+
+
+class _Builder:
+    def __init__(self, spec: Spec) -> None:
+        self.spec = spec
+        self.names: dict[str, Symbolic] = {}
+        self.symbols: dict[str, Symbolic] = {}
+        self.mistakes: list[Mistake] = []
+        self.lowering = Lowering(Trace(), {})
+
+    def build(self) -> Model:
+        spec = self.spec
+        self.names |= constants(spec.constants, lambda e: self.lowering(e).constant)
+        # a fixed step and initial values may use parameters: at their spec values
+        parameters = [(p.name, self.number(p.value)) for p in spec.parameters]
+        folded = {
+            **self.names,
+            **{name: sympy.Rational(v.numerator, v.denominator) for name, v in parameters},
+        }
+        step = spec.dt
+        nominal = self.number(step.nominal, folded) if step is not None else None
+        fixed = nominal if step is not None and not step.run_time else None
+        if fixed is not None:
+            self.names["dt"] = folded["dt"] = sympy.Rational(fixed.numerator, fixed.denominator)
+        for name in [*(n for n, _ in parameters), *(s.name for s in spec.states), *(i.name for i in spec.inputs),
+                     *(w.name for w in spec.noise), *(d.name for d in spec.let), "t",
+                     *([] if fixed is not None else ["dt"])]:  # fmt: skip
+            self.declare(name)
+        definitions = tuple((d.name, self.tree(d.value)) for d in spec.let)
+        n = len(spec.states)
+        dynamics = spec.dynamics
+        default = [self.names[s.name] if dynamics.form == "discrete" else sympy.S.Zero for s in spec.states]
+        f = tuple(
+            self.tree(dynamics.f[s.name]) if s.name in dynamics.f else d
+            for s, d in zip(spec.states, default, strict=True)
+        )
+        places = tuple(dynamics.f[s.name].place if s.name in dynamics.f else dynamics.place for s in spec.states)
+        if isinstance(dynamics.Q, Mapping):
+            diagonal = [self.tree(dynamics.Q[s.name]) if s.name in dynamics.Q else sympy.S.Zero for s in spec.states]
+            Q = tuple(tuple(diagonal[i] if i == j else sympy.S.Zero for j in range(n)) for i in range(n))
+        else:
+            Q = self.matrix(dynamics.Q)
+        limits: tuple[Fraction | None, Fraction | None] = (None, None)
+        if step is not None and step.run_time:
+            limits = (
+                None if step.minimum is None else self.number(step.minimum),
+                None if step.maximum is None else self.number(step.maximum),
+            )
+        sensors = tuple(self.sensor(s) for s in spec.measurements)
+        return Model(
+            spec=spec,
+            symbols=self.symbols,
+            definitions=definitions,
+            f=f,
+            f_places=places,
+            noises=self.noises(spec.noise),
+            noise_covariance=self.covariance(spec.noise, spec.noise_covariance),
+            Q=Q,
+            sensors=sensors,
+            x0=tuple(self.number(s.init, folded) for s in spec.states),
+            P0=initial_covariance(spec, lambda e: self.number(e, folded)),
+            periods=tuple(None if s.period is None else self.number(s.period) for s in spec.states),
+            bounds=tuple(
+                None if s.bounds is None else (self.number(s.bounds[0]), self.number(s.bounds[1])) for s in spec.states
+            ),
+            floors=self.limits(spec.filter.variance_floor),
+            ceilings=self.limits(spec.filter.variance_ceiling),
+            parameters=tuple(parameters),
+            dt=fixed,
+            dt_limits=limits,
+            options=self.options(spec.filter),
+            firsts=build_firsts(spec, self.names),
+            outputs=tuple(OutputModel(o.name, self.tree(o.value)) for o in spec.outputs),
+        )
+
+    def options(self, chosen: Filter) -> Options:
+        names = {**self.names, INNOVATION.name: INNOVATION}
+        states = [s.name for s in self.spec.states]
+        return build_options(chosen, states, self.number, lambda e: self.tree(e, names))
+
+    # pieces ------------------------------------------------------------------------------------------
+
+    def declare(self, name: str) -> None:
+        self.symbols[name] = self.names[name] = sympy.Symbol(name)
+
+    def tree(self, expression: Expression, names: Mapping[str, Symbolic] | None = None) -> Symbolic:
+        return to_sympy(expression.tree, self.names if names is None else names)
+
+    def number(self, expression: Expression, names: Mapping[str, Symbolic] | None = None) -> Fraction:
+        """The exact value of a constant expression."""
+        try:
+            value = self.lowering(self.tree(expression, names)).constant
+        except KeyError:
+            value = None
+        if value is None:
+            raise SpecError.at(expression.place, f"`{expression.text}` is not a constant with a finite value")
+        return value
+
+    def matrix(self, rows: Matrix) -> tuple[tuple[Symbolic, ...], ...]:
+        return tuple(tuple(self.tree(e) for e in row) for row in rows)
+
+    def limits(self, values: Mapping[str, Expression]) -> tuple[Fraction | None, ...]:
+        return tuple(self.number(values[s.name]) if s.name in values else None for s in self.spec.states)
+
+    def noises(self, noises: tuple[Noise, ...]) -> tuple[NoiseModel, ...]:
+        return tuple(NoiseModel(w.name, self.names[w.name], w.density) for w in noises)
+
+    def covariance(self, noises: tuple[Noise, ...], full: Matrix | None) -> tuple[tuple[Symbolic, ...], ...]:
+        if full is not None:
+            return self.matrix(full)
+        variances = [sympy.S.Zero if w.variance is None else self.tree(w.variance) for w in noises]
+        q = len(noises)
+        return tuple(tuple(variances[i] if i == j else sympy.S.Zero for j in range(q)) for i in range(q))
+
+    def sensor(self, sensor: Sensor) -> SensorModel:
+        for name in (*(w.name for w in sensor.noise), *(i.name for i in sensor.inputs)):
+            self.declare(name)
+        m = len(sensor.components)
+        if sensor.R is not None:
+            R = self.matrix(sensor.R)
+        else:
+            variances = [sympy.S.Zero if c.variance is None else self.tree(c.variance) for c in sensor.components]
+            R = tuple(tuple(variances[i] if i == j else sympy.S.Zero for j in range(m)) for i in range(m))
+        residuals: list[Symbolic | None] = []
+        for c in sensor.components:
+            if c.residual is None:
+                residuals.append(None)
+                continue
+            names = {**self.names, "z": sympy.Symbol(f"z_{c.name}"), "h": sympy.Symbol(f"h_{c.name}")}
+            residuals.append(self.tree(c.residual, names))
+        return SensorModel(
+            spec=sensor,
+            h=tuple(self.tree(c.h) for c in sensor.components),
+            residual=tuple(residuals),
+            R=R,
+            periods=tuple(None if c.period is None else self.number(c.period) for c in sensor.components),
+            noises=self.noises(sensor.noise),
+            noise_covariance=self.covariance(sensor.noise, sensor.noise_covariance),
+            gate=build_gate(sensor.gate, self.number, self.tree),
+            options=self.options(filter_of(self.spec.filter, sensor)) if sensor.own else None,
+        )
