@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -31,25 +29,21 @@ class Rule:
         self.waits = rule.waits
         (sensor,) = [each for each in model.spec.measurements if each.name == rule.sensor]
         hidden = {component.name: measured(rule.sensor, component.name) for component in sensor.components}
+        shared = {definition.name: measured(rule.sensor, definition.name) for definition in rule.let}
         self._hidden = hidden
         formulas = [*rule.states.values(), *rule.variance.values(), *(d.value for d in rule.let)]
-        shared = {definition.name: f" {rule.sensor}.{definition.name}" for definition in rule.let}
         used = {name for formula in formulas for name in names(formula.tree)} - set(shared)
         self.components = tuple(name for name in hidden if name in used)
         self.read = frozenset(used - set(hidden))
 
-        for definition in rule.let:
-            model.scope.define(shared[definition.name], self._own(definition.value, shared))
-
         def compiled(formula: Expression) -> Closure:
-            return model.scope.compile(self._own(formula, shared))
+            return model.scope.compile(renamed(formula.tree, {**hidden, **shared}))
+
+        slots = model.scope.slots
+        self._shared = [(slots[shared[definition.name]], compiled(definition.value)) for definition in rule.let]
 
         self._states = {name: compiled(formula) for name, formula in rule.states.items()}
         self._variances = {name: compiled(formula) for name, formula in rule.variance.items()}
-
-    def _own(self, formula: Expression, shared: Mapping[str, str]) -> Expression:
-        """With the names of the components, and of what the formulas share, those that stand for them here."""
-        return replace(formula, tree=renamed(formula.tree, {**self._hidden, **shared}))
 
     def complete(self, reading: Reading) -> bool:
         """Whether all components that it is made of are there."""
@@ -65,6 +59,8 @@ class Rule:
         for component, value in zip(reading.sensor.components, seen.tolist(), strict=True):
             environment[model.scope.slots[self._hidden[component]]] = value
         with np.errstate(all="ignore"):
+            for slot, formula in self._shared:  # each uses only those before it
+                environment[slot] = value_of(formula(environment))
             states = {model.index[name]: value_of(f(environment)) for name, f in self._states.items()}
             variances = {model.row[name]: value_of(f(environment)) for name, f in self._variances.items()}
         if not all(map(math.isfinite, (*states.values(), *variances.values()))):

@@ -89,6 +89,7 @@ class Model:
         # what comes with measurements; two sensors may call theirs alike
         given = [entry.name for sensor in spec.measurements for entry in sensor.inputs]
         given += [measured(sensor.name, c.name) for sensor in spec.measurements for c in sensor.components]
+        given += [measured(rule.sensor, d.name) for rule in spec.initialize for d in rule.let]
         own = ("t", "dt", Z, PREDICTED, INNOVATION)
         self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, *given, *own))
         self._noise_slots = tuple(self.scope.slots[name] for name in noises)

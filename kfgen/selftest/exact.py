@@ -89,7 +89,7 @@ def record_exactly(spec: Spec, code: FilterCode, scalar: Fixed, declared: Declar
     x = np.array(xs, dtype=np.float64)
     variance = np.array(variances, dtype=np.float64) if covariance else None
     steps = Track(u.astype(np.float64), dt.astype(np.float64), z.astype(np.float64)).first(len(xs))
-    outputs = np.array(told, dtype=np.float64).reshape(-1, 2, len(spec.outputs))
+    outputs = np.array(told, dtype=np.float64).reshape(len(xs), 2, len(spec.outputs))
     return Record(
         steps, x, variance, 0.0, np.zeros(x.shape[1]), tuple(statuses), outputs[:, 0], outputs[:, 1],
     )  # fmt: skip

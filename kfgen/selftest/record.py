@@ -81,7 +81,7 @@ def record(spec: Spec, track: Track) -> Record:
     quantum = np.maximum(sigma * tolerance / 64, np.abs(x).max(axis=0) * FINEST[spec.scalar])
     x = np.array([[_rounded(v, q) for v, q in zip(*rows, strict=True)] for rows in zip(x, quantum, strict=True)])
     variance = np.array([[_rounded(v, abs(v) * tolerance / 64) for v in row] for row in variance])
-    outputs = np.array(told[: len(x)]).reshape(-1, 2, len(spec.outputs))
+    outputs = np.array(told[: len(x)]).reshape(len(x), 2, len(spec.outputs))
     y, deviation = outputs[:, 0], outputs[:, 1]
     # an output may be a constant, of which nothing but rounding is allowed
     fine = np.maximum(deviation * tolerance / 64, np.abs(y).max(axis=0, initial=0.0) * FINEST[spec.scalar] / 32)

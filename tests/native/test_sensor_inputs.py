@@ -190,3 +190,51 @@ def test_simulated_over_their_ranges() -> None:
         assert low <= column.min() < column.max() <= high
     again = simulate(loads(text_of("ekf")), 200)
     np.testing.assert_array_equal(log.columns["beacon.b_x"], again.columns["beacon.b_x"])
+
+
+def test_with_a_steady_gain() -> None:
+    """The gain does not depend on them; the residual does."""
+    text = """
+kfgen: 1
+name: steady
+scalar: double
+dt: 0.1
+inputs: {u: {}}
+states: {p: {init: 1, std: 1}, v: {init: 2, std: 1}}
+dynamics: {f: {p: p + dt*v, v: v + dt*u}, Q: {v: 0.1}}
+measurements: {m: {inputs: {b: {}, idle: {}}, z: {p: {h: p - b, std: 1}}}}
+initialize: [{from: m, states: {p: p + b, v: u}}]
+filter: {type: kf, gain: steady}
+"""
+    (kf,) = load_filters([build(loads(text))])
+    for each in (kf, reference(kf.spec)):
+        assert each.predict([math.nan]) == Status.OK  # waits
+        assert each.update("m", [3.0], [math.nan], inputs=[1.0, 0.0]) == Status.NOT_FINITE
+        assert each.update("m", [3.0], [0.5], inputs=[math.nan, 0.0]) == Status.NOT_FINITE
+        assert each.update("m", [3.0], [0.5], inputs=[1.0, math.nan]) == Status.OK
+        assert each.x == pytest.approx([4.0, 0.5])
+        assert each.predict([0.0]) == Status.OK
+        assert each.update("m", [3.0], [math.nan], inputs=[math.nan, 0.0]) == Status.NOT_FINITE
+        assert each.update("m", [3.2], [math.nan], inputs=[1.0, math.nan]) == Status.OK
+    ref = reference(kf.spec)
+    for each in (kf, ref):
+        each.init()
+        each.update("m", [3.0], [0.5], inputs=[1.0, 0.0])
+        for k in range(5):
+            each.predict([0.1])
+            each.update("m", [3.0 + 0.1 * k], [0.5], inputs=[1.0, 0.0])
+    np.testing.assert_allclose(kf.x, ref.x, rtol=1e-12)
+
+
+def test_cost_counts_their_calls() -> None:
+    from kfgen.cost.job import make_job
+
+    generated = build(loads(text_of("ekf") + "outputs: {speed: {value: 'hypot(vx, vy)'}}\n"))
+    job = make_job(generated, simulate(generated.spec, 10))
+    functions = [step.function for step in job.steps]
+    assert functions.count("update_beacon") == 10
+    assert functions.count("get_outputs") == 10
+    assert not job.functions["get_outputs"]  # of no part in the filter's flash
+    (first,) = [step for step in job.steps if step.function == "update_beacon"][:1]
+    assert len(first.values["z_beacon"]) == 6
+    assert "ranging_get_outputs(&ranging_kfgen_kf, &ranging_kfgen_value, &ranging_kfgen_std)" in job.driver()
