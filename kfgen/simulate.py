@@ -10,7 +10,8 @@ noise. The model is evaluated by the reference, never by generated code.
 * Fixed dt: row k is the time (k + 1) dt, after that row's predict. Run-time dt: the first row is t = 0,
   without a step; the steps are the nominal one with up to 10 % of jitter, within [min, max].
 * An imm switches modes by its transition matrix, row by row, from a mode drawn with mu0.
-* The truth of a state with bounds is clipped to them; angles and measured angles are wrapped.
+* The truth of a state with bounds is clipped to them; angles and measured angles are wrapped. What is drawn for a
+  quaternion, of a state or measured, is its rotation error.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ def _simulate(spec: Spec, steps: int, random: Draws, every: Mapping[str, int], g
     modes = _mode_track(spec, model, dt, random)
     x = worlds[modes[0]].initial(random)
     run_time = spec.dt is not None and spec.dt.run_time
-    truth = np.empty((steps, model.n))
+    truth = np.empty((steps, model.nx))
     given = {sensor.name: _inputs(sensor.inputs, model, steps, random) for sensor in spec.measurements}
     readings = {sensor.name: np.full((steps, len(sensor.fields)), np.nan) for sensor in spec.measurements}
     now = 0.0
@@ -147,28 +148,28 @@ class _World:
         return _Meter(sensor, SensorModel(self.model, sensor), SensorModel(self.model, quiet))
 
     def initial(self, random: Draws) -> Array:
-        """A draw of the first state [n]."""
+        """A draw of the first state [nx]."""
         model = self.model
-        return self._placed(model.x0 + _draw(model.P0, random))
+        return self._placed(model.space.moved(model.x0, _draw(model.P0, random)))
 
     def step(self, x: Array, context: Context, random: Draws) -> Array:
-        """The state [n] after a step with drawn noise."""
+        """The state [nx] after a step with drawn noise."""
         Qw = self._noise(self.model.environment(context, x))[np.ix_(self._held, self._held)]
         after = self._process.advance(x, _draw(Qw, random), context)
-        after = after + _draw(self._additive.linearise(x, context).Q, random)
+        after = self.model.space.moved(after, _draw(self._additive.linearise(x, context).Q, random))
         if not np.all(np.isfinite(after)):
             raise KfgenError(f"{self.spec.name}: the simulated state left the finite numbers; try another --seed")
         return self._placed(after)
 
     def measure(self, name: str, x: Array, context: Context, random: Draws) -> Array:
-        """A drawn reading [m] of a sensor at the state x [n]."""
+        """A drawn reading [m] of a sensor at the state x [nx]."""
         meter = self._meters[name]
         used = tuple(range(meter.model.m))
         noise = self.model.noise_covariance(meter.spec.noise, meter.spec.noise_covariance)
         e = _draw(noise(self.model.environment(context, x, own=meter.model.own)), random)
         z = np.array([value_of(h) for h in meter.model.predict(list(x), list(e), context, used)])
         R = meter.additive.linearise(x, Reading(meter.additive, z, used, context)).R
-        z = z + _draw(R, random)
+        z = meter.model.space.moved(z, _draw(R, random))
         for i, component in enumerate(meter.spec.components):
             period = None if component.period is None else self.model.number(component.period)
             z[i] = part_of(period).placed(float(z[i]))

@@ -104,7 +104,7 @@ def columns(spec: Spec, result: RunResult) -> dict[str, NDArray[np.generic]]:
     names = [state.name for state in spec.states]
     wide = spec.code.compensated
     out |= {f"x.{name}": result.x[:, i].astype(np.float64 if name in wide else own) for i, name in enumerate(names)}
-    out |= {f"var.{name}": result.var[:, i].astype(own) for i, name in enumerate(names)}
+    out |= {f"var.{name}": result.var[:, i].astype(own) for i, name in enumerate(spec.errors)}
     out |= {f"nis.{name}": nis.astype(own) for name, nis in result.nis.items()}
     out["status"] = result.status
     if result.mu is not None and spec.imm is not None:

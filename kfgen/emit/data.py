@@ -91,6 +91,7 @@ class View:
     ram: int
     scalar: ScalarView
     states: tuple[Named, ...]
+    errors: tuple[Named, ...]  # of the error coordinates; empty where they are the states
     state_table: tuple[str, ...]
     reference: tuple[Data, ...]
     cost_table: tuple[str, ...]

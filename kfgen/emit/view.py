@@ -58,6 +58,7 @@ def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPo
             scalar.literal(Fraction(0)), scalar.literal(Fraction(1)), scalar.function("ceil"),
         ),
         states=header.indices(NAME, spec.states),
+        errors=header.errors(NAME, code),
         state_table=tuple(header.state_table(code)),
         reference=tuple(reference),
         cost_table=tuple(header.cost_table(maker.costs)),

@@ -106,8 +106,9 @@ class Trace:
 
     in_place = True  # what is loaded is what stands where it will be stored
 
-    def __init__(self, smallest: Fraction | int = 0) -> None:
+    def __init__(self, smallest: Fraction | int = 0, epsilon: Fraction = Fraction(1, 2**52)) -> None:
         self.smallest = smallest  # a number not above it counts as zero where it divides
+        self.epsilon = epsilon  # relative spacing of the numbers at 1
         self.pool = RecordingPool()
         self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body
         self.raised: list[tuple[Value, str]] = []  # conditions of warnings, and which

@@ -88,8 +88,10 @@ def build_bank(spec: Spec) -> BankModel:
 def _combined(models: tuple[Model, ...], mu: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
     """The mean of the modes' x0, about that of the largest weight."""
     heaviest = models[max(range(len(mu)), key=lambda i: (mu[i], -i))]
-    out = []
-    for k, (part, base) in enumerate(zip(heaviest.parts, heaviest.x0, strict=True)):
-        shift = sum((m * part.local(model.x0[k], base) for model, m in zip(models, mu, strict=True)), Fraction(0))
-        out.append(base + shift)
+    space, base = heaviest.space, heaviest.space.normalised(heaviest.x0)
+    apart = [space.local(space.normalised(model.x0), base) for model in models]
+    shift = [sum((m * d[j] for m, d in zip(mu, apart, strict=True)), Fraction(0)) for j in range(space.dimension)]
+    out = space.retract(base, shift)
+    for i, j, _ in space.singles:
+        out[i] = heaviest.x0[i] + shift[j]
     return tuple(out)

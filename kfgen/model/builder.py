@@ -14,11 +14,12 @@ from kfgen.ir.trace import Trace
 from kfgen.model.first import build_firsts
 from kfgen.model.model import Model, NoiseModel, OutputModel, SensorModel
 from kfgen.model.options import INNOVATION, Options, build_gate, build_options
+from kfgen.model.rotations import Names, Registry, increment, rotation_models
 from kfgen.model.start import initial_covariance
 from kfgen.model.symbolic import constants, to_sympy
 from kfgen.spec.sensors import filter_of
-from kfgen.spec.tree import Expression
-from kfgen.spec.types import Filter, Matrix, Noise, Sensor, Spec
+from kfgen.spec.tree import Expression, Name
+from kfgen.spec.types import Filter, Matrix, Noise, Sensor, Spec, error_names
 
 Symbolic = Any  # a SymPy expression
 
@@ -34,7 +35,8 @@ def build_model(spec: Spec) -> Model:
 class _Builder:
     def __init__(self, spec: Spec) -> None:
         self.spec = spec
-        self.names: dict[str, Symbolic] = {}
+        self.registry = Registry({r.parts: r.name for r in spec.rotations})
+        self.names = Names({}, self.registry)
         self.symbols: dict[str, Symbolic] = {}
         self.mistakes: list[Mistake] = []
         self.lowering = Lowering(Trace(), {})
@@ -58,16 +60,18 @@ class _Builder:
                      *([] if fixed is not None else ["dt"])]:  # fmt: skip
             self.declare(name)
         definitions = tuple((d.name, self.tree(d.value)) for d in spec.let)
-        n = len(spec.states)
+        n = len(spec.errors)
         dynamics = spec.dynamics
+        turns = self.turns()
+        turning = {part for r, turn in zip(spec.rotations, turns, strict=True) if turn is not None for part in r.parts}
         default = [self.names[s.name] if dynamics.form == "discrete" else sympy.S.Zero for s in spec.states]
         f = tuple(
-            self.tree(dynamics.f[s.name]) if s.name in dynamics.f else d
+            self.tree(dynamics.f[s.name]) if s.name in dynamics.f and s.name not in turning else d
             for s, d in zip(spec.states, default, strict=True)
         )
         places = tuple(dynamics.f[s.name].place if s.name in dynamics.f else dynamics.place for s in spec.states)
         if isinstance(dynamics.Q, Mapping):
-            diagonal = [self.tree(dynamics.Q[s.name]) if s.name in dynamics.Q else sympy.S.Zero for s in spec.states]
+            diagonal = [self.tree(dynamics.Q[name]) if name in dynamics.Q else sympy.S.Zero for name in spec.errors]
             Q = tuple(tuple(diagonal[i] if i == j else sympy.S.Zero for j in range(n)) for i in range(n))
         else:
             Q = self.matrix(dynamics.Q)
@@ -78,14 +82,21 @@ class _Builder:
                 None if step.maximum is None else self.number(step.maximum),
             )
         sensors = tuple(self.sensor(s) for s in spec.measurements)
+        options = self.options(spec.filter)
+        Q_noise = self.covariance(spec.noise, spec.noise_covariance)
+        outputs = tuple(OutputModel(o.name, self.tree(o.value)) for o in spec.outputs)
+        firsts = build_firsts(spec, self.names)
         return Model(
             spec=spec,
-            symbols=self.symbols,
-            definitions=definitions,
+            symbols={**self.symbols, **{name: sympy.Symbol(name) for name in self.registry.values}},
+            definitions=definitions + tuple(self.registry.values.items()),
+            rotations=rotation_models(spec.rotations, [s.name for s in spec.states]),
+            turns=turns,
+            turned=self.registry.turned,
             f=f,
             f_places=places,
             noises=self.noises(spec.noise),
-            noise_covariance=self.covariance(spec.noise, spec.noise_covariance),
+            noise_covariance=Q_noise,
             Q=Q,
             sensors=sensors,
             x0=tuple(self.number(s.init, folded) for s in spec.states),
@@ -99,15 +110,30 @@ class _Builder:
             parameters=tuple(parameters),
             dt=fixed,
             dt_limits=limits,
-            options=self.options(spec.filter),
-            firsts=build_firsts(spec, self.names),
-            outputs=tuple(OutputModel(o.name, self.tree(o.value)) for o in spec.outputs),
+            options=options,
+            firsts=firsts,
+            outputs=outputs,
         )
 
+    def turns(self) -> tuple[tuple[Symbolic, ...] | None, ...]:
+        """How a step turns each quaternion; see Model."""
+        dynamics, out = self.spec.dynamics, list[tuple[Symbolic, ...] | None]()
+        lets = {d.name: d.value.tree for d in self.spec.let}
+        for rotation in self.spec.rotations:
+            if dynamics.form != "discrete":
+                rates = [dynamics.f.get(name) for name in rotation.errors]
+                out.append(tuple(sympy.S.Zero if e is None else self.tree(e) for e in rates))
+            elif any(name in dynamics.f for name in rotation.parts):
+                numbers = [dynamics.f[name].tree if name in dynamics.f else Name(name) for name in rotation.parts]
+                found = increment(numbers, rotation.parts, lets)
+                out.append(None if found is None else tuple(to_sympy(tree, self.names) for tree in found))
+            else:
+                out.append((sympy.S.Zero,) * 3)
+        return tuple(out)
+
     def options(self, chosen: Filter) -> Options:
-        names = {**self.names, INNOVATION.name: INNOVATION}
-        states = [s.name for s in self.spec.states]
-        return build_options(chosen, states, self.number, lambda e: self.tree(e, names))
+        names = Names({**self.names, INNOVATION.name: INNOVATION}, self.registry)
+        return build_options(chosen, list(self.spec.errors), self.number, lambda e: self.tree(e, names))
 
     # pieces ------------------------------------------------------------------------------------------
 
@@ -131,7 +157,7 @@ class _Builder:
         return tuple(tuple(self.tree(e) for e in row) for row in rows)
 
     def limits(self, values: Mapping[str, Expression]) -> tuple[Fraction | None, ...]:
-        return tuple(self.number(values[s.name]) if s.name in values else None for s in self.spec.states)
+        return tuple(self.number(values[name]) if name in values else None for name in self.spec.errors)
 
     def noises(self, noises: tuple[Noise, ...]) -> tuple[NoiseModel, ...]:
         return tuple(NoiseModel(w.name, self.names[w.name], w.density) for w in noises)
@@ -146,19 +172,23 @@ class _Builder:
     def sensor(self, sensor: Sensor) -> SensorModel:
         for name in (*(w.name for w in sensor.noise), *(i.name for i in sensor.inputs)):
             self.declare(name)
-        m = len(sensor.components)
+        components = [c.name for c in sensor.components]
         if sensor.R is not None:
             R = self.matrix(sensor.R)
         else:
-            variances = [sympy.S.Zero if c.variance is None else self.tree(c.variance) for c in sensor.components]
+            given = {c.name: c.variance for c in sensor.components}
+            given |= {name: v for r in sensor.rotations for name, v in zip(r.errors, r.variances, strict=True)}
+            names = error_names(components, sensor.rotations)
+            m = len(names)
+            variances = [sympy.S.Zero if (v := given[name]) is None else self.tree(v) for name in names]
             R = tuple(tuple(variances[i] if i == j else sympy.S.Zero for j in range(m)) for i in range(m))
         residuals: list[Symbolic | None] = []
         for c in sensor.components:
             if c.residual is None:
                 residuals.append(None)
                 continue
-            names = {**self.names, "z": sympy.Symbol(f"z_{c.name}"), "h": sympy.Symbol(f"h_{c.name}")}
-            residuals.append(self.tree(c.residual, names))
+            own = {"z": sympy.Symbol(f"z_{c.name}"), "h": sympy.Symbol(f"h_{c.name}")}
+            residuals.append(self.tree(c.residual, Names({**self.names, **own}, self.registry)))
         return SensorModel(
             spec=sensor,
             h=tuple(self.tree(c.h) for c in sensor.components),
@@ -169,4 +199,5 @@ class _Builder:
             noise_covariance=self.covariance(sensor.noise, sensor.noise_covariance),
             gate=build_gate(sensor.gate, self.number, self.tree),
             options=self.options(filter_of(self.spec.filter, sensor)) if sensor.own else None,
+            rotations=rotation_models(sensor.rotations, components),
         )

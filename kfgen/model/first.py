@@ -56,6 +56,7 @@ def build_firsts(spec: Spec, names: Mapping[str, Symbolic]) -> tuple[FirstModel,
         used = {s.name for e in formulas for s in e.free_symbols}
         plain = all(isinstance(e.tree, Name) and e.tree.name in components for e in rule.states.values())
         own = tuple(name for name in components if name in used)
-        alone = plain and not variances and not rule.waits
+        turned = {part for rotation in spec.rotations for part in rotation.parts}
+        alone = plain and not variances and not rule.waits and not turned & set(states)
         out.append(FirstModel(rule.sensor, states, variances, tuple(definitions), own, rule.waits, alone))
     return tuple(out)

@@ -9,12 +9,13 @@ from functools import cached_property
 from typing import Any
 
 from kfgen.errors import Place
-from kfgen.geometry import Part, part_of
+from kfgen.geometry import Space, part_of
 from kfgen.model.first import FirstModel
 from kfgen.model.options import GateModel, Options
+from kfgen.model.rotations import RotationModel, Turned
 from kfgen.model.symbolic import partials
 from kfgen.spec.sensors import filter_of
-from kfgen.spec.types import Sensor, Spec
+from kfgen.spec.types import Sensor, Spec, error_names
 
 Symbolic = Any  # a SymPy expression
 
@@ -30,7 +31,8 @@ class NoiseModel:
 
 @dataclass(frozen=True)
 class SensorModel:
-    """One sensor of m components. h: (m,), R: (m, m), noise covariance (q, q) over `noises`."""
+    """One sensor. h: of each component; R (m, m), m being the degrees of freedom of an innovation: the number of
+    components, but 3 for the four of a quaternion; noise covariance (q, q) over `noises`."""
 
     spec: Sensor
     h: tuple[Symbolic, ...]
@@ -41,15 +43,16 @@ class SensorModel:
     noise_covariance: tuple[tuple[Symbolic, ...], ...]
     gate: GateModel | None
     options: Options | None = None  # where it has some of its own
+    rotations: tuple[RotationModel, ...] = ()
 
     @property
     def name(self) -> str:
         return self.spec.name
 
     @cached_property
-    def parts(self) -> tuple[Part, ...]:
-        """The geometry of each component."""
-        return tuple(part_of(period) for period in self.periods)
+    def space(self) -> Space:
+        """The geometry of its components."""
+        return _space(self.periods, self.rotations)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -59,7 +62,12 @@ class SensorModel:
     @property
     def dimension(self) -> int:
         """Degrees of freedom of an innovation."""
-        return sum(part.dimension for part in self.parts)
+        return self.space.dimension
+
+    @cached_property
+    def errors(self) -> tuple[str, ...]:
+        """The names of the entries of an innovation."""
+        return error_names([c.name for c in self.spec.components], self.spec.rotations)
 
 
 @dataclass(frozen=True)
@@ -72,7 +80,11 @@ class OutputModel:
 
 @dataclass(frozen=True)
 class Model:
-    """The model of a spec with n states. f: x[k+1], or dx/dt where the form is continuous."""
+    """The model of a spec with n errors of its states. f: x[k+1], or dx/dt where the form is continuous.
+
+    turns: of each rotation the rotation vector (3,) by which a step turns it on the body's side, or its rate in the
+    body's frame where the form is continuous; None: f has its four numbers.
+    """
 
     spec: Spec
     symbols: Mapping[str, Symbolic]
@@ -96,16 +108,24 @@ class Model:
     outputs: tuple[OutputModel, ...] = ()
     firsts: tuple[FirstModel, ...] = ()  # of a bank: its head's
     keeps_time: bool = False  # whether something outside of the model depends on t
+    rotations: tuple[RotationModel, ...] = ()
+    turns: tuple[tuple[Symbolic, ...] | None, ...] = ()
+    turned: Mapping[str, Turned] = field(default_factory=dict)  # definitions whose derivatives are known
     _partials: dict[Symbolic, tuple[tuple[Symbolic, Symbolic], ...]] = field(default_factory=dict, repr=False)
 
     @property
     def states(self) -> tuple[str, ...]:
         return tuple(s.name for s in self.spec.states)
 
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """The error coordinates: the states, but three of each quaternion in place of its numbers."""
+        return self.spec.errors
+
     @cached_property
-    def parts(self) -> tuple[Part, ...]:
-        """The geometry of each state."""
-        return tuple(part_of(period) for period in self.periods)
+    def space(self) -> Space:
+        """The geometry of the state."""
+        return _space(self.periods, self.rotations)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -140,7 +160,8 @@ class Model:
         return out
 
     def dynamics_expressions(self) -> list[Symbolic]:
-        return [*self.f, *(e for m in (self.Q, self.noise_covariance) for row in m for e in row)]
+        turns = [e for turn in self.turns if turn is not None for e in turn]
+        return [*self.f, *turns, *(e for m in (self.Q, self.noise_covariance) for row in m for e in row)]
 
     @property
     def every_options(self) -> tuple[Options, ...]:
@@ -169,3 +190,9 @@ class Model:
         for sensor in self.sensors:
             all_expressions += self.sensor_expressions(sensor)
         return self.keeps_time or "t" in self.uses(*all_expressions)
+
+
+def _space(periods: tuple[Fraction | None, ...], rotations: tuple[RotationModel, ...]) -> Space:
+    first = {rotation.first: rotation.geometry for rotation in rotations}
+    others = {rotation.first + k for rotation in rotations for k in (1, 2, 3)}
+    return Space(tuple(first.get(i, part_of(period)) for i, period in enumerate(periods) if i not in others))

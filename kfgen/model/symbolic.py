@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -10,6 +10,7 @@ import sympy
 
 from kfgen.model import functions as kf
 from kfgen.model import turning
+from kfgen.model.rotations import Names, entries, gathered
 from kfgen.spec.tree import Call, Name, Number, Tree, names
 from kfgen.spec.types import Constant
 
@@ -27,7 +28,23 @@ def to_sympy(tree: Tree, known: Mapping[str, Any]) -> Any:
             return sympy.E
         return known[tree.name]
     assert isinstance(tree, Call)
+    registry = known.registry if isinstance(known, Names) else None
+    if tree.op == "rotation":
+        i, j = (int(a.value) for a in tree.args[:2] if isinstance(a, Number))
+        numbers = [to_sympy(argument, known) for argument in tree.args[2:]]
+        return entries(numbers)[i][j] if registry is None else registry.entry(numbers, i, j)
+    if registry is not None and registry.quartets and tree.op in ("add", "sub"):
+        return gathered(registry, sympy.Add(*_terms(tree, 1, known)))
     return _CALLS[tree.op](*[to_sympy(argument, known) for argument in tree.args])
+
+
+def _terms(tree: Tree, sign: int, known: Mapping[str, Any]) -> Iterator[Any]:
+    """The terms of a sum of sums."""
+    if isinstance(tree, Call) and tree.op in ("add", "sub"):
+        yield from _terms(tree.args[0], sign, known)
+        yield from _terms(tree.args[1], sign if tree.op == "add" else -sign, known)
+    else:
+        yield sign * to_sympy(tree, known)
 
 
 def constants(entries: Iterable[Constant], value: Callable[[Any], Fraction | None]) -> dict[str, Any]:

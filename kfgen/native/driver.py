@@ -37,6 +37,7 @@ def source(spec: Spec, declared: Declarations) -> str:
         name=name,
         signature=_signature(name),
         nx=len(spec.states),
+        ne=len(spec.errors),
         nu=len(spec.inputs),
         nz=sum(len(each["fields"]) for each in sensors),
         sensors=sensors,

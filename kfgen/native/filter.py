@@ -93,14 +93,14 @@ class NativeFilter:
         return self.struct.call("set_state", self.struct.array(new, self.struct.units.x))
 
     def set_covariance(self, P: ArrayLike) -> int:
-        """Replace the covariance [n, n], of which the upper triangle is read."""
-        n = len(self.states)
+        """Replace the covariance [n, n] of the n errors of the state, of which the upper triangle is read."""
+        n = len(self.spec.errors)
         return self.struct.call("set_covariance", self.struct.array(shaped(P, (n, n), "P"), self.struct.units.P))
 
     def set_sqrt_covariance(self, S: ArrayLike) -> int:
         """Replace the lower Cholesky factor of the covariance [n, n] (`covariance: sqrt` only)."""
-        n = len(self.states)
-        unit = np.broadcast_to(self.struct.units.x[:, None], (n, n))
+        n = len(self.spec.errors)
+        unit = np.broadcast_to(self.struct.units.errors[:, None], (n, n))
         return self.struct.call("set_sqrt_covariance", self.struct.array(shaped(S, (n, n), "S"), unit))
 
     def redraw(self) -> int:
@@ -119,14 +119,14 @@ class NativeFilter:
 
     @property
     def P(self) -> Array:
-        """The full covariance [n, n]."""
+        """The full covariance [n, n] of the n errors of the state: of a quaternion three."""
         return self.struct.get("get_covariance", self.struct.units.P)
 
     @property
     def sqrt_covariance(self) -> Array:
         """The lower Cholesky factor of the covariance [n, n] (`covariance: sqrt` only)."""
-        n = len(self.states)
-        return self.struct.get("get_sqrt_covariance", np.broadcast_to(self.struct.units.x[:, None], (n, n)))
+        n = len(self.spec.errors)
+        return self.struct.get("get_sqrt_covariance", np.broadcast_to(self.struct.units.errors[:, None], (n, n)))
 
     @property
     def outputs(self) -> dict[str, float]:

@@ -135,6 +135,7 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
     log = as_log(source, spec)
     work = plan(spec, log, fixed_step(spec))
     rows, n, sensors = log.rows, len(spec.states), len(spec.measurements)
+    errors = len(spec.errors)
     modes = len(spec.imm.modes) if spec.imm else 0
     scalar, units = struct.value, struct.units
 
@@ -146,7 +147,7 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         "z": scalar.to_raw(scalar.near(work.z, units.reading_periods), units.readings),
         "x": np.zeros((rows, n), scalar.dtype),
         "rest": np.zeros((rows, len(struct.compensated)), scalar.dtype),
-        "var": np.zeros((rows, n), scalar.dtype),
+        "var": np.zeros((rows, errors), scalar.dtype),
         "nis": np.zeros((rows, sensors), scalar.dtype),
         "mu": np.zeros((rows, modes), scalar.dtype),
         "out": np.zeros((rows, len(spec.outputs)), scalar.dtype),
@@ -173,7 +174,7 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         x=x,
         var=scalar.to_physical(arrays["var"], np.diag(units.P))
         if struct.has("get_covariance")
-        else np.full((rows, n), np.nan),
+        else np.full((rows, errors), np.nan),
         nis={name: np.where(updated[:, i], nis[:, i], np.nan) for i, name in enumerate(units.z)},
         status=np.bitwise_or.reduce(status, axis=1),
         calls={function: status[:, i] for i, function in enumerate(functions)},

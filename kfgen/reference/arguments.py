@@ -24,11 +24,12 @@ def own_inputs(sensor: SensorModel, inputs: ArrayLike | Mapping[str, float] | No
 
 
 def components_used(sensor: SensorModel, mask: int | Sequence[bool] | None) -> tuple[int, ...]:
-    """The components that a mask selects; all without one."""
+    """The components (indices) that a mask selects, bit i for number i; all without one. A quaternion is in use where
+    all of it is. Raises TypeError for a sensor that takes no mask."""
     if mask is None:
         return tuple(range(sensor.m))
     if not sensor.partial:
         raise TypeError(f"sensor {sensor.name} takes no mask")
     if isinstance(mask, int | np.integer):
-        return tuple(i for i in range(sensor.m) if int(mask) >> i & 1)
-    return tuple(i for i, bit in enumerate(mask) if bit)
+        return sensor.space.whole([i for i in range(sensor.m) if int(mask) >> i & 1])
+    return sensor.space.whole([i for i, bit in enumerate(mask) if bit])

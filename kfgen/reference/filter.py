@@ -30,7 +30,7 @@ class ReferenceFilter:
     """One filter, in float64 and physical units.
 
     Attributes (arrays are copies):
-        x (n), P (n, n): the estimate, in the spec's order of the states.
+        x (nx), P (n, n): the estimate, in the spec's order of the states; of a quaternion P has three errors.
         nis: normalised innovation squared of the last update, also of a gated one; 0 after init.
         log_likelihood: of the last update that was made.
         t: seconds since init.
@@ -144,10 +144,13 @@ class ReferenceFilter:
         return int(Status.OK)
 
     def set_state(self, x: ArrayLike) -> int:
-        """Sets x (n), wrapped; NOT_FINITE leaves the filter as it was."""
-        new = np.array(x, dtype=np.float64).reshape(self.model.n)
-        if not np.isfinite(new).all():
-            return int(Status.NOT_FINITE)
+        """Sets x (nx), wrapped, quaternions normalised; NOT_FINITE, and NOT_POSITIVE for a quaternion with a norm below
+        1e-3, leave the filter as it was."""
+        new = np.array(x, dtype=np.float64).reshape(self.model.nx)
+        try:
+            self.model.space.judge(new)
+        except StepError as error:
+            return int(error.status)
         self._estimate = self.algorithm.placed(self._estimate, lambda x: self.model.wrap(new))
         return int(Status.OK)
 
@@ -226,8 +229,7 @@ class ReferenceFilter:
         sensor's own, in order or by name, where it has some."""
         model = self.sensors[sensor]
         measured = np.array(z, dtype=np.float64).reshape(model.m)
-        given = self._inputs(u, needed=model.takes_inputs)
-        own = own_inputs(model, inputs)
+        given, own = self._inputs(u, needed=model.takes_inputs), own_inputs(model, inputs)
         used = components_used(model, mask)
         if not used or self._firsts.hold(sensor):
             return int(Status.OK)
@@ -236,8 +238,7 @@ class ReferenceFilter:
             first = self._firsts.of(reading)
             read = self._read.update(sensor, used) | (first.read if first is not None else frozenset())
             self._test(read, given, dict(zip(model.own, own.tolist(), strict=True)))
-            if not np.isfinite(measured[list(used)]).all():
-                raise StepError(Status.NOT_FINITE)
+            reading.space.judge(measured[list(used)])
             if first is not None:
                 self._estimate = first.apply(self.algorithm, self._estimate, reading)
                 self._firsts.come(sensor)

@@ -54,16 +54,18 @@ class Rule:
         return all(names.index(component) in reading.used for component in self.components)
 
     def apply(self, algorithm: Estimator, estimate: Estimate, reading: Reading) -> Estimate:
-        """The estimate that it leaves. Raises StepError NOT_FINITE, or NOT_POSITIVE of a variance below 0."""
+        """The estimate that it leaves. Raises StepError NOT_FINITE, or NOT_POSITIVE of a variance below 0 or of a
+        quaternion that is too short to be one."""
         model = self.model
         environment = model.environment(reading.context, model.x0, own=reading.sensor.own)
-        for component, value in zip(reading.sensor.components, reading.z.tolist(), strict=True):
+        seen = reading.sensor.space.normalised(reading.z)
+        for component, value in zip(reading.sensor.components, seen.tolist(), strict=True):
             environment[model.scope.slots[self._hidden[component]]] = value
         with np.errstate(all="ignore"):
             for slot, formula in self._shared:  # each uses only those before it
                 environment[slot] = value_of(formula(environment))
             states = {model.index[name]: value_of(f(environment)) for name, f in self._states.items()}
-            variances = {model.index[name]: value_of(f(environment)) for name, f in self._variances.items()}
+            variances = {model.row[name]: value_of(f(environment)) for name, f in self._variances.items()}
         if not all(map(math.isfinite, (*states.values(), *variances.values()))):
             raise StepError(Status.NOT_FINITE)
         if any(variance < 0.0 for variance in variances.values()):
@@ -72,6 +74,7 @@ class Rule:
         def moved(x: Vector) -> Vector:
             x = x.copy()
             x[list(states)] = list(states.values())
+            model.space.judge(x)
             return model.wrap(model.clip(x))
 
         def spread(P: Matrix) -> Matrix:

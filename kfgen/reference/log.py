@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from kfgen.reference.arguments import components_used
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.replayed import Replayed
 from kfgen.reference.status import Status
@@ -18,7 +19,7 @@ from kfgen.reference.status import Status
 class Run:
     """A filter's course over a log of r rows, after each row.
 
-    x (r, n), var (r, n): the estimate and the diagonal of its covariance. nis: sensor -> (r), NaN in rows
+    x (r, nx), var (r, n): the estimate and the diagonal of its covariance. nis: sensor -> (r), NaN in rows
     without an update of it (or with one that failed). status (r): the bits of the row's calls, or-ed. mu (r, B):
     the probabilities of the modes of an imm, else None. outputs, output_std: name -> (r), of a spec with outputs.
     """
@@ -59,7 +60,7 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
             readings[sensor.name] = np.column_stack([columns.get(name, absent) for name in names])
 
     result = Run(
-        np.zeros((rows, kf.model.n)),
+        np.zeros((rows, kf.model.nx)),
         np.zeros((rows, kf.model.n)),
         {name: np.full(rows, math.nan) for name in kf.sensors},
         np.zeros(rows, dtype=np.int64),
@@ -98,6 +99,8 @@ def _measure(kf: Replayed, name: str, z: Vector, u: Vector | None, result: Run, 
     if np.any(np.isnan(own)) or not np.any(present) or not (sensor.partial or np.all(present)):
         return 0
     mask = sum(1 << i for i in range(sensor.m) if present[i]) if sensor.partial else None
+    if not components_used(sensor, mask):
+        return 0
     status = kf.update(name, z, u if sensor.takes_inputs else None, mask, own if sensor.own else None)
     if status < Status.ERROR:
         result.nis[name][row] = kf.nis

@@ -14,6 +14,7 @@ from kfgen.reference.dual import Matrix, Number, Vector, value_of
 from kfgen.reference.evaluate import Closure, Environment, Scope
 from kfgen.reference.exact import Exact
 from kfgen.reference.linalg import check_covariance
+from kfgen.reference.manifold import Manifold
 from kfgen.reference.status import StepError
 from kfgen.spec.tree import Expression
 from kfgen.spec.types import Matrix as Formulas
@@ -60,9 +61,11 @@ class Model:
     """The state of a spec and the scope of its expressions.
 
     Attributes:
-        n, states, inputs: size of the state, names of the states and of the inputs.
-        periods: index of an angle or periodic state -> its period.
-        x0 (n), P0 (n, n): the initial estimate, wrapped.
+        space: the states and their errors. nx, n: how many numbers x has, and how many its error.
+        states, errors, inputs: their names.
+        row: error -> its index in P; index: state -> its index in x.
+        periods: index of an angle or periodic state -> its period; turns: the same by the index in P.
+        x0 (nx), P0 (n, n): the initial estimate, wrapped.
         values: the parameters' values in the spec.
     Raises SpecError where the initial covariance is none.
     """
@@ -71,7 +74,9 @@ class Model:
         self.spec = spec
         self.states = tuple(state.name for state in spec.states)
         self.inputs = tuple(entry.name for entry in spec.inputs)
-        self.n = len(self.states)
+        self.space = Manifold(self.states, spec.rotations)
+        self.nx, self.n, self.errors = self.space.n, self.space.k, self.space.errors
+        self.row = {name: i for i, name in enumerate(self.errors)}
         self.index = {name: i for i, name in enumerate(self.states)}
         constants = _constants(spec)
         parameters = tuple(parameter.name for parameter in spec.parameters)
@@ -93,7 +98,8 @@ class Model:
             self.scope.define(definition.name, definition.value)
 
         self.periods = {i: self.number(state.period) for i, state in enumerate(spec.states) if state.period is not None}
-        low, high = np.full(self.n, -math.inf), np.full(self.n, math.inf)
+        self.turns = {self.row[self.states[i]]: period for i, period in self.periods.items()}
+        low, high = np.full(self.nx, -math.inf), np.full(self.nx, math.inf)
         for i, state in enumerate(spec.states):
             if state.bounds is not None:
                 low[i], high[i] = (self.number(bound) for bound in state.bounds)
@@ -114,7 +120,7 @@ class Model:
         self, context: Context, x: Sequence[Number] | Vector, noise: Mapping[str, Number] | None = None,
         own: Sequence[str] = (),
     ) -> Environment:  # fmt: skip
-        """An environment with the states at x (n); noises are 0 unless given. own: names of the sensor's inputs."""
+        """An environment with the states at x (nx); noises are 0 unless given. own: names of the sensor's inputs."""
         environment, slots = self.scope.empty(), self.scope.slots
         for name, parameter in context.parameters.items():
             environment[slots[name]] = parameter
@@ -150,14 +156,14 @@ class Model:
         return self.covariance({e.name: e.variance for e in noise if e.variance is not None}, names)
 
     def wrap(self, x: Vector) -> Vector:
-        """x (n) with every periodic state brought into (-period/2, period/2]."""
-        x = x.copy()
+        """x (nx) with every periodic state brought into (-period/2, period/2], and quaternions of norm 1."""
+        x = self.space.normalised(x).copy()
         for i, period in self.periods.items():
             x[i] = wrap(float(x[i]), period)
         return x
 
     def clip(self, x: Vector) -> Vector:
-        """x (n) clipped to the states' bounds."""
+        """x (nx) clipped to the states' bounds."""
         return np.clip(x, self._low, self._high)
 
     def _initial_covariance(self) -> Matrix:
@@ -165,11 +171,14 @@ class Model:
         P = np.zeros((self.n, self.n))
         if spec.P0 is not None:
             P = np.array([[self.number(entry) for entry in row] for row in spec.P0])
-        for i, state in enumerate(spec.states):
-            if state.variance is not None:
-                P[i, i] = self.number(state.variance)
+        variances = {state.name: state.variance for state in spec.states if state.name in self.row}
+        for rotation in spec.rotations:
+            variances |= dict(zip(rotation.errors, rotation.variances, strict=True))
+        for name, variance in variances.items():
+            if variance is not None:
+                P[self.row[name], self.row[name]] = self.number(variance)
         for pair in spec.covariances:
-            i, j = self.index[pair.first], self.index[pair.second]
+            i, j = self.row[pair.first], self.row[pair.second]
             P[i, j] = P[j, i] = self.number(pair.value)
         try:
             check_covariance(P)

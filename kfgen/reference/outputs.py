@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from kfgen.reference.algorithm import Estimate
-from kfgen.reference.dual import Vector, jacobian, values, variables
+from kfgen.reference.dual import Vector, jacobian, values
 from kfgen.reference.model import Context, Model
 
 
@@ -24,13 +24,13 @@ class Outputs:
         return self._told(self._seen(estimate, context)[0])
 
     def deviations(self, estimate: Estimate, context: Context) -> dict[str, float]:
-        """sqrt(diag(J P J^T)), J = dg/dx at x; all NaN where a value or a variance is not finite."""
+        """sqrt(diag(J P J^T)), J = dg(x [+] d)/dd at 0; all NaN where a value or a variance is not finite."""
         y, variance = self._seen(estimate, context)
         return self._told(np.sqrt(np.maximum(variance, 0.0)) if np.isfinite(y).all() else y)
 
     def _seen(self, estimate: Estimate, context: Context) -> tuple[Vector, Vector]:
         with np.errstate(all="ignore"):
-            environment = self.model.environment(context, variables(estimate.x))
+            environment = self.model.environment(context, self.model.space.around(estimate.x))
             found = [formula(environment) for formula in self._formulas]
             J = jacobian(found, self.model.n)
             return values(found), np.einsum("ki,ij,kj->k", J, estimate.P, J)

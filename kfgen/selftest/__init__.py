@@ -18,7 +18,7 @@ from kfgen.ir.program import walk
 from kfgen.scalar_names import DOUBLE
 from kfgen.scalars import SCALARS, Scalar
 from kfgen.selftest.exact import record_exactly
-from kfgen.selftest.record import Record, record
+from kfgen.selftest.record import Record, by_state, record
 from kfgen.selftest.track import Track, track_of
 from kfgen.spec.constants import value
 from kfgen.spec.types import Spec
@@ -129,7 +129,11 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
         arrays.append(_array("scale", "the largest |x| of each state", abs(found.x).max(axis=0), scalar))
     if found.variance is not None and not exact:
         largest = np.maximum(found.variance.max(axis=0), found.initial)
-        arrays.append(_array("spread", "the largest variance of each state", largest, scalar))
+        what = "error" if spec.rotations else "state"
+        arrays.append(_array("spread", f"the largest variance of each {what}", largest, scalar))
+    if found.variance is not None and spec.rotations and not exact:
+        seen = by_state(spec, found.variance)
+        arrays.append(_array("uncertainty", "the variance that each state is compared by", seen.ravel(), scalar))
     if found.variance is not None:
         arrays.append(_array("variances", "the diagonal of P after each step", found.variance.ravel(), scalar))
     if spec.outputs:

@@ -29,7 +29,7 @@ class Twin:
         self.memory = interpret.Memory()
         self._functions = {each.name: each for each in code.functions}
         self.spec = spec = code.model.spec
-        self.memory.arrays["P"] = [0] * len(spec.states) ** 2
+        self.memory.arrays["P"] = [0] * len(spec.errors) ** 2
         for name, indices in code.constants.items():
             self.memory.arrays[f"{spec.name}_{name}"] = list(indices)
         for block in code.blocks:
@@ -61,7 +61,8 @@ class Twin:
     def variances(self) -> list[int]:
         """The diagonal of P."""
         self.call("get_covariance")
-        P, n = self.memory.arrays["P"], len(self.memory.arrays["kf.x"])
+        P = self.memory.arrays["P"]
+        n = round(len(P) ** 0.5)
         return [P[i * n + i] for i in range(n)]
 
 
@@ -91,7 +92,7 @@ def record_exactly(spec: Spec, code: FilterCode, scalar: Fixed, declared: Declar
     steps = Track(u.astype(np.float64), dt.astype(np.float64), z.astype(np.float64)).first(len(xs))
     outputs = np.array(told, dtype=np.float64).reshape(len(xs), 2, len(spec.outputs))
     return Record(
-        steps, x, variance, 0.0, np.zeros(x.shape[1]), tuple(statuses), outputs[:, 0], outputs[:, 1],
+        steps, x, variance, 0.0, np.zeros(len(spec.errors)), tuple(statuses), outputs[:, 0], outputs[:, 1],
     )  # fmt: skip
 
 

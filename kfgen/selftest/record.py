@@ -33,7 +33,7 @@ FINEST = {FLOAT: 2.0**-22, DOUBLE: 2.0**-44}
 
 @dataclass(frozen=True)
 class Record:
-    """The track, x [k, n] and the diagonal of P [k, n] after each step (None where a filter keeps no covariance).
+    """The track, x [k, nx] and the diagonal of P [k, n] after each step (None where a filter keeps no covariance).
 
     outputs, deviations (k, outputs): what the filter tells after each step. Where statuses are given, one of each step,
     all are raw numbers of the scalar type that must come out to the bit;
@@ -56,7 +56,7 @@ def record(spec: Spec, track: Track) -> Record:
     # rounded to a float's precision for double too: a self-test also runs where a double has four bytes
     ref, coarse = reference(spec), reference(spec)
     steady = spec.filter.gain is not None and spec.imm is None
-    n = len(spec.states)
+    n = len(spec.errors)
     initial = np.zeros(n) if steady else np.diag(ref.P).copy()
     xs, variances = [], []
     told: list[tuple[list[float], list[float]]] = []
@@ -76,7 +76,7 @@ def record(spec: Spec, track: Track) -> Record:
     if not xs:
         raise KfgenError(f"{spec.name}: the reference does not get through one step of a simulated run")
     x, variance = np.array(xs), np.array(variances)
-    sigma = np.sqrt(np.maximum(variance, 0.0))
+    sigma = np.sqrt(np.maximum(by_state(spec, variance), 0.0))
     # coarser than what another machine's libm may change, finer than what is tested
     quantum = np.maximum(sigma * tolerance / 64, np.abs(x).max(axis=0) * FINEST[spec.scalar])
     x = np.array([[_rounded(v, q) for v, q in zip(*rows, strict=True)] for rows in zip(x, quantum, strict=True)])
@@ -92,10 +92,20 @@ def record(spec: Spec, track: Track) -> Record:
     )  # fmt: skip
 
 
+def by_state(spec: Spec, variance: Array) -> Array:
+    """Variances [k, n] of the errors as those of the states [k, nx]: of a quaternion's numbers the largest of three."""
+    index = {name: i for i, name in enumerate(spec.errors)}
+    columns = {state.name: [index[state.name]] for state in spec.states if state.name in index}
+    columns |= {part: [index[e] for e in r.errors] for r in spec.rotations for part in r.parts}
+    return np.column_stack([variance[:, columns[state.name]].max(axis=1) for state in spec.states])
+
+
 def _near(ref: ReferenceFilter, coarse: ReferenceFilter, variance: Array) -> bool:
-    parts = [part_of(ref.model.periods.get(i)) for i in range(len(ref.x))]
-    error = np.abs([part.local(a, b) for part, a, b in zip(parts, ref.x, coarse.x, strict=True)])
-    allowed = TOLERANCES[FLOAT] / 8 * np.sqrt(np.maximum(variance, 0.0)) + 1e-6 * np.abs(ref.x)
+    error = ref.model.space.difference(ref.x, coarse.x)
+    for i, period in ref.model.turns.items():
+        error[i] = part_of(period).local(float(error[i]), 0.0)
+    error = np.abs(error)
+    allowed = TOLERANCES[FLOAT] / 8 * np.sqrt(np.maximum(variance, 0.0)) + 1e-6 * ref.model.space.size(ref.x)
     apart = np.abs(np.diag(coarse.P) - variance) > TOLERANCES[FLOAT] / 8 * variance + 1e-6 * np.max(variance)
     return not (np.any(error > allowed) or np.any(apart))
 

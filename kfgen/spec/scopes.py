@@ -80,9 +80,9 @@ class Scopes:
                 continue
             for context in self._users(path, everywhere=True):
                 if name in taken[context]:
-                    other, where = taken[context][name]
-                    text = f"the name {short(name)} is already that of a {other} (line {where.line})"
-                    self.problems.add(place, text, "choose another one")
+                    kind = taken[context][name][0]
+                    text = f"the name {short(name)} is already that of {'an' if kind[0] == 'i' else 'a'} {kind}"
+                    self.problems.add(place, text, "choose another one; those of other sensors may be the same")
 
     def _users(self, path: Path, everywhere: bool = False) -> list[str]:
         """The contexts that use what stands at a path."""

@@ -85,6 +85,10 @@ class Form(Protocol[P]):
         """F P F^T + Q + sum of d w w^T over the noise columns (w, d). F: (n, n)."""
         ...
 
+    def turned(self, t: Trace, P: P, T: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> P:
+        """The same as `predict` of a P that has been updated. T: (n, n), regular."""
+        ...
+
     def at_rest(self, t: Trace, P: P) -> Motion:
         """No motion, before P is updated."""
         ...

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
 from functools import reduce
 from operator import or_
 
@@ -13,6 +14,8 @@ from kfgen.ir.nodes import BOOL, Node
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
+
+SMALLEST_NORM = Fraction(1, 1000)  # of a quaternion that is given
 
 
 def arguments(t: Trace, needed: Mapping[str, Value] | None = None) -> None:
@@ -76,3 +79,13 @@ def doubts(t: Trace, values: list[Value]) -> None:
         for condition, why in t.doubts:
             t.guard(condition, "NOT_POSITIVE", why)
         t.doubts.clear()
+
+
+def quaternion(t: Trace, q: Sequence[Value]) -> list[Value]:
+    """Four given numbers whose squares do not overflow; NOT_POSITIVE where they are too small to be a quaternion."""
+    largest = t.name(reduce(lambda a, b: t.function("max", a, b), [t.function("abs", a) for a in q]), "largest")
+    t.guard(largest < SMALLEST_NORM / 2, "NOT_POSITIVE")
+    q = [t.name(a / largest, "part") for a in q]
+    norm = t.name(largest * t.function("sqrt", q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), "norm")
+    t.guard(norm < SMALLEST_NORM, "NOT_POSITIVE")
+    return q

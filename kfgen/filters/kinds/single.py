@@ -21,6 +21,7 @@ from kfgen.filters.steps.gate import gate, store_outcome
 from kfgen.filters.steps.outputs import outputs_function
 from kfgen.filters.steps.phases import Judged, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.steps.process import Step
+from kfgen.filters.steps.sensor import used_errors
 from kfgen.filters.steps.state import StateCode
 from kfgen.ir.footprint import crowded
 from kfgen.ir.program import Function
@@ -48,7 +49,7 @@ class SingleFilter(ABC):
         self.form = form
         self.order = order = form.order
         self.scalar = scalar
-        self.names = [model.states[i] for i in order]
+        self.names = [model.errors[i] for i in order]
         options = model.options
         self.Q = None if options.adapt_Q is None else AdaptedQ(model, order, form.factored, scalar.epsilon)
         extra = [] if self.Q is None else [self.Q.kept.block()]
@@ -169,7 +170,7 @@ class SingleFilter(ABC):
 
     def predict(self, taken: frozenset[str]) -> Function:
         """x <- f(x, u, 0), P <- F P F^T + Q + G Qw G^T."""
-        t = Trace(self.scalar.smallest)
+        t = Trace(self.scalar.smallest, self.scalar.epsilon)
         arguments, step = begin_predict(t, self.model, self.state.first)
         for _ in self.predicting(t, step):
             pass
@@ -180,12 +181,13 @@ class SingleFilter(ABC):
 
     def update(self, sensor: SensorModel, taken: frozenset[str], partial: bool = False) -> Function:
         """The update with the whole vector z of a sensor, or with the components that a mask selects."""
-        model, t = self.model, Trace(self.scalar.smallest)
+        model, t = self.model, Trace(self.scalar.smallest, self.scalar.epsilon)
         arguments, used = begin_update(t, [model.of(sensor)], [sensor], partial, self.state.first)
         self.state.first.run(t, sensor, used)
-        for phase in self.of(sensor).updating(t, sensor, used):
+        counted = used_errors(sensor, used)
+        for phase in self.of(sensor).updating(t, sensor, counted):
             if isinstance(phase, Judged):
-                gate(t, model, [sensor], [phase.nis], used)
+                gate(t, model, [sensor], [phase.nis], counted)
             else:
                 made = phase
         assert made.nis is not None

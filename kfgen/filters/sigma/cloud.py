@@ -16,8 +16,11 @@ from kfgen.filters.algebra.linalg import Vector, plus, times
 from kfgen.filters.algebra.numbers import is_zero, select
 from kfgen.filters.base import CONST_KF, INPUTS, image_of, sensor_argument
 from kfgen.filters.sigma.points import PointSet
+from kfgen.filters.sigma.turned import point
 from kfgen.filters.steps import process
+from kfgen.filters.steps.sensor import predicted_attitude
 from kfgen.geometry.part import Part
+from kfgen.geometry.space import Space
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Argument, Call, Function, Statement, roots, walk
 from kfgen.ir.schedule import schedule
@@ -113,6 +116,32 @@ def dynamics(model: Model, carried: tuple[str, ...], taken: frozenset[str]) -> P
     return private("f", body, [out], "x <- f(x, u, w), in place")
 
 
+def turning_dynamics(model: Model, images: Space, carried: tuple[str, ...], taken: frozenset[str]) -> Private:
+    """e <- f(start [+] e, u, w) [-] centre in place, e (n + q) with the carried noises behind the n errors."""
+    t, n = Trace(), len(model.errors)
+    used = model.uses(*model.dynamics_expressions())
+    noises = {w.name: t.zero for w in model.noises}
+    for k, name in enumerate(carried):
+        noises[name] = t.name(t.element("e", n + k), name)
+    start = [t.element("start", i) for i in range(len(model.states))]
+    x = point(model, start, [t.element("e", i) for i in range(n)])
+    x = [clipped(t, value, bounds) for value, bounds in zip(x, model.bounds, strict=True)]
+    for value, name in zip(x, model.states, strict=True):
+        if name in used:
+            t.name(value, name)
+    duals = _duals(t, model, x, noises, used)
+    after = process.moved(t, model, duals, duals["dt"].value if "dt" in duals else None)
+    after = [clipped(t, value, bounds) for value, bounds in zip(after, model.bounds, strict=True)]
+    centre = [t.element("centre", i) for i in range(len(model.states))]
+    for i, value in enumerate(images.local(after, centre)):
+        t.store("e", i, t.value(value))
+    arrays = [Argument("start", "{name}_real_t", pointer=True, size=len(model.states)),
+              Argument("centre", "{name}_real_t", pointer=True, size=len(model.states)),
+              Argument("e", "{name}_real_t", pointer=True, constant=False, size=n + len(carried))]  # fmt: skip
+    body = schedule(t, taken | {"kf", "u", "step", "e", "start", "centre"})
+    return private("f", body, arrays, "e <- f(start [+] e, u, w) [-] centre, in place")
+
+
 def private(
     name: str, body: list[Statement], arrays: list[Argument], doc: str, sensor: SensorModel | None = None
 ) -> Private:
@@ -131,8 +160,15 @@ def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], tak
         noises[name] = t.name(t.element("x", n + k), name)
     evaluator = Evaluator(t, model, _duals(t, model, _state(t, model, used), noises, used, sensor))
     name = image_of(sensor)
+    turning = {r.first + k for r in sensor.rotations for k in range(4)}
+    z: list[Dual] = []
     for i, e in enumerate(sensor.h):
-        t.store(name, i, evaluator.value(e))
+        z.append(Dual(evaluator.value(e)))
+        if i not in turning:
+            t.store(name, i, z[i].value)
+    for r in sensor.rotations:
+        for k, value in enumerate(predicted_attitude(evaluator, sensor, r, z).q):
+            t.store(name, r.first + k, value)
     point = Argument("x", "{name}_real_t", pointer=True, size=n + len(carried))
     out = Argument(name, "{name}_real_t", pointer=True, constant=False, size=len(sensor.h))
     body = schedule(t, taken | {"kf", "u", "x", "z", name})

@@ -155,6 +155,10 @@ class First:
         guards.positive(t, [value < 0 for value in variances])
         given = dict(zip(rule.states, wanted, strict=True))
         x = self.confined(t, [given.get(name, t.zero) for name in model.states])
+        for r in model.rotations:
+            if r.parts[0] in given:
+                own = slice(r.first, r.first + 4)
+                x[own] = r.geometry.normalised(guards.quaternion(t, x[own]))
         second = Compensation(model).place
         for i, name in enumerate(model.states):
             if name not in given:
@@ -165,7 +169,7 @@ class First:
                 t.store(f"kf.{FIELD}", second[i], t.zero)
         if variances:
             assert self.isolating is not None
-            places = [model.states.index(name) for name in rule.variances]
+            places = [model.errors.index(name) for name in rule.variances]
             self.isolating(t, dict(zip(places, variances, strict=True)))
         true = t.wrapped(t.pool.boolean(True))
         for path in self.outdated:

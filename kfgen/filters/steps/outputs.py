@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from kfgen.filters.algebra.dual import Dual, Evaluator, seeds
+from kfgen.filters.algebra.dual import Dual, Evaluator, state_seeds
 from kfgen.filters.algebra.linalg import Rows
 from kfgen.filters.algebra.numbers import Number, select, sqrt
 from kfgen.filters.base import CONST_KF
@@ -35,7 +35,7 @@ def outputs_function(t: Trace, model: Model, variances: Variances, taken: frozen
     for name, value in zip(model.states, x, strict=True):
         if name in used:
             t.name(value, name)
-    given = seeds(t, dict(zip(model.states, x, strict=True)))
+    given = state_seeds(t, model, x)
     given |= process.parameters_and_inputs(t, model, inputs=False)
     if "t" in used:
         given["t"] = process.time_now(t, model)
@@ -48,7 +48,7 @@ def outputs_function(t: Trace, model: Model, variances: Variances, taken: frozen
     with t.when(t.present(DEVIATION)):
         t.section("their standard deviations: sqrt(J P J^T)")
         duals = [evaluator(output.value) for output in model.outputs]
-        found = [t.value(v) for v in variances([[d.gradient.get(s, t.zero) for s in model.states] for d in duals])]
+        found = [t.value(v) for v in variances([[d.gradient.get(e, t.zero) for e in model.errors] for d in duals])]
         for output, variance in zip(model.outputs, found, strict=True):
             t.name(variance, f"var_{output.name}")
         guards.finite(t, found)

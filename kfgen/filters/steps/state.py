@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from kfgen.filters.algebra.numbers import select
 from kfgen.filters.base import KF, Block
+from kfgen.filters.frame import guards
 from kfgen.filters.frame.runs import put
 from kfgen.filters.steps.compensation import Compensation
 from kfgen.filters.steps.first import First, Isolating
@@ -52,7 +53,7 @@ class StateCode:
     def blocks(self) -> list[Block]:
         """The fields of the struct, in order."""
         model = self.model
-        x0 = tuple(part.placed(v) for v, part in zip(model.x0, model.parts, strict=True))
+        x0 = tuple(model.space.normalised(model.x0))
         out = [Block("x", self.n, "state", initial=x0)]
         out += self.covariance
         out.append(NIS)
@@ -72,16 +73,15 @@ class StateCode:
         return [*out, *self.first.blocks()]
 
     def confined(self, t: Trace, x: list[Value]) -> list[Value]:
-        """x within its bounds, angles wrapped. Spec's order."""
-        out = []
-        for value, bounds, part, name in zip(
-            x, self.model.bounds, self.model.parts, self.model.states, strict=True
-        ):
+        """x within its bounds, angles wrapped; quaternions as they are. Spec's order."""
+        out = list(x)
+        for i, _, part in self.model.space.singles:
+            value, bounds, name = x[i], self.model.bounds[i], self.model.states[i]
             if bounds is not None:
                 low, high = t.value(bounds[0]), t.value(bounds[1])
                 value = t.name(value, f"{name}_free") if value.constant is None else value
                 value = select(value < low, low, select(value > high, high, value))
-            out.append(part.placed(value))
+            out[i] = part.placed(value)
         return out
 
     # functions ---------------------------------------------------------------------------------------
@@ -114,7 +114,9 @@ class StateCode:
         given = [t.element("x", i) for i in range(self.n)]
         for value in given:  # one by one: the sum of large numbers would overflow
             t.guard(~t.finite(value), "NOT_FINITE")
-        x = [part.placed(v) for v, part in zip(given, self.model.parts, strict=True)]
+        for r in self.model.rotations:
+            given[r.first : r.first + 4] = guards.quaternion(t, given[r.first : r.first + 4])
+        x = self.model.space.normalised(given)
         for path in self.states:
             for i, value in enumerate(x):
                 t.store(path, i, value)
@@ -126,7 +128,8 @@ class StateCode:
             "set_state",
             [KF, argument],
             schedule(t, taken | {"x", "P"}),
-            "Replace the state; angles are wrapped, the covariance stays.",
+            "Replace the state; angles are wrapped, " + "quaternions normalised, " * bool(self.model.rotations)
+            + "the covariance stays.",
         )
 
 

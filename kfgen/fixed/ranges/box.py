@@ -21,6 +21,7 @@ class Box:
     """
 
     states: tuple[Span | None, ...]
+    numbers: tuple[int | None, ...]  # error coordinate -> its state; None for those of a quaternion
     inputs: dict[str, Span]
     parameters: dict[str, Span]
     readings: dict[tuple[str, str], Span]
@@ -70,6 +71,7 @@ def box_of(model: Model) -> Box:
     low, high = model.dt_limits
     return Box(
         states=tuple(states),
+        numbers=model.space.numbers_of,
         inputs={each.name: limits(each.range, spec) for each in spec.inputs if each.range is not None},
         parameters=parameters,
         readings={

@@ -74,7 +74,7 @@ class Drive:
         player.begin(leg.fresh, leg.parameters)
         truth.begin(random)
         truth.memory.numbers.update({f"kf.parameters.{name}": value for name, value in leg.parameters.items()})
-        off = [a - float(b) for a, b in zip(truth.x, self.model.x0, strict=True)] if leg.fresh else [0.0] * n
+        off = [a - float(b) for a, b in zip(truth.x, self.model.x0, strict=True)] if leg.fresh else [0.0] * truth.nx
         truth.place(leg.x, [0.0] * n)
         self._place(player, [a + e for a, e in zip(leg.x, off, strict=True)])
         mode = k % self.weather.modes
@@ -102,10 +102,10 @@ class Drive:
             self._note(leg, inputs, dt)
 
     def _place(self, player: Player, x: Sequence[float]) -> None:
-        player.place([
-            part.placed(self.box.inside(i, a) if part.flat else a)
-            for i, (a, part) in enumerate(zip(x, self.model.parts, strict=True))
-        ])  # fmt: skip
+        inside = list(x)
+        for i, _, part in self.model.space.singles:
+            inside[i] = self.box.inside(i, x[i]) if part.flat else x[i]
+        player.place(self.model.space.placed(inside))
 
     def _stepped(self, mode: int, inputs: dict[str, float], dt: float, random: Random) -> bool:
         """A step of the truth; False where it leaves the numbers."""

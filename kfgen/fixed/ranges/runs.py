@@ -109,7 +109,7 @@ class Runner:
     def _correlate(self, memory: Memory, correlation: float) -> None:
         if "set_covariance" not in self.names:
             return
-        n = len(self.code.model.states)
+        n = len(self.code.model.errors)
         self.program.run("get_covariance", memory)
         P = memory.arrays["P"]
         root = [math.sqrt(max(P[i * n + i], 0.0)) for i in range(n)]
@@ -138,7 +138,7 @@ class Runner:
 
     def variances(self, memory: Memory) -> list[float]:
         """P_ii (n); 0 where the filter does not say."""
-        n = len(self.code.model.states)
+        n = len(self.code.model.errors)
         return self.program.variances(memory, n) if "get_covariance" in self.names else [0.0] * n
 
     def rescale(self, memory: Memory, factors: Sequence[float]) -> None:
@@ -209,7 +209,7 @@ class Runner:
             self.program.run("get_covariance", other)
         if "set_covariance" in self.names:
             P = list(other.arrays["P"])
-            n = len(self.code.model.states)
+            n = len(self.code.model.errors)
             for part in (P, [p if i % (n + 1) == 0 else 0.5 * p for i, p in enumerate(P)]):
                 other.arrays["P"] = list(part)
                 self.program.run("set_covariance", other)

@@ -114,10 +114,6 @@ def _sensors(facts: Facts, imm: Imm) -> None:
             kinds = [(a.kind, b.kind) for a, b in zip(own.components, other.components, strict=True)]
             if any(a != b for a, b in kinds):
                 facts.add(own.place, f"`kind` in {short(own.name)} differs between modes", "write the same in all")
-            if [i.name for i in own.inputs] != [i.name for i in other.inputs]:
-                at = facts.at(f"{own.place.path}.inputs", otherwise=own.place)
-                text = f"`inputs` of {short(own.name)} differ between modes, which take the same measurement"
-                facts.add(at, text, "write the same in all: " + (", ".join(i.name for i in other.inputs) or "none"))
             if [r.error for r in own.rotations] != [r.error for r in other.rotations]:
                 facts.add(own.place, f"`error` in {short(own.name)} differs between modes", "write the same in all")
 

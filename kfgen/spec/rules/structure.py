@@ -79,9 +79,8 @@ def _initialize(facts: Facts) -> None:
         if not initialize.states and facts.empty(f"{path}.states"):
             facts.add(facts.at(f"{path}.states"), "no state is set", "write `states: {px: x}`")
         if initialize.sensor in sensors:
-            at = facts.at(f"{path}.from", otherwise=initialize.place)
-            text = f"the sensor {short(initialize.sensor)} stands twice in `initialize`"
-            facts.add(at, text, "set all its states in one entry")
+            text = f"the sensor {short(initialize.sensor)} is named twice"
+            facts.add(initialize.place, text, "set all states in one entry")
             continue
         sensors.add(initialize.sensor)
         for state, value in initialize.states.items():

@@ -10,7 +10,7 @@ from kfgen.spec.shaping.extents import Shaped, number
 from kfgen.spec.tree import Call, Expression, Name, Tree, names
 from kfgen.spec.types import Definition
 
-_DEFINABLE = ("f", "Q", "h", "R")  # scopes in which definitions may stand
+_DEFINABLE = ("f", "Q", "h", "R", "residual", "output")  # scopes in which definitions may stand
 MOST_HIDDEN = 2_000
 
 
