@@ -31,6 +31,7 @@ from kfgen.interface import Array, Filter
 from kfgen.native.run import Plan, plan
 from kfgen.scalar_names import DOUBLE, FLOAT
 from kfgen.simulate import simulate
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status, describe
 
@@ -130,7 +131,7 @@ def compare(
     differences: list[str] = []
     calls, lost, errors_differ = 0, 0, False
     tolerance = tolerance_of(spec.scalar)
-    grain = _Grain(list(kf.states), spec.code.compensated) if spec.scalar == FLOAT else None
+    grain = _Grain(list(spec.errors), spec.code.compensated) if spec.scalar == FLOAT else None
     for row in range(steps):
         for call in _calls(spec, work, row, random):
             ours, theirs = _made(kf, call), _made(ref, call)
@@ -144,7 +145,7 @@ def compare(
                 errors_differ |= ours >= ERROR or theirs >= ERROR
                 _follow(ref, kf, coarse)
         if grain is not None:
-            grain.see(ref.x, ref.P)
+            grain.see(ref.model.space.flat(ref.x), ref.P)
         departs = scales.x_errors(coarse.x, ref.x, ref.P)
         if coarse is not ref and not max(*departs, *scales.P_errors(coarse.P, ref.P)) <= tolerance:
             lost += 1
@@ -174,19 +175,21 @@ def _follow(ref: ReferenceFilter, *others: Filter) -> None:
 
 @dataclass(frozen=True)
 class Call:
-    """An update of a sensor with z [m], or without a sensor a predict; u [nu], dt in s and mask where they are used."""
+    """An update of a sensor with z [m] and its own inputs, or without a sensor a predict; u [nu], dt in s and mask
+    where they are used."""
 
     sensor: str | None = None
     z: Array = field(default_factory=lambda: np.empty(0))
     u: Array | None = None
     dt: float | None = None
     mask: int | None = None
+    inputs: Array | None = None
 
 
 def _made(kf: Filter, call: Call) -> int:
     if call.sensor is None:
         return kf.predict(call.u, call.dt)
-    return kf.update(call.sensor, call.z, call.u, call.mask)
+    return kf.update(call.sensor, call.z, call.u, call.mask, call.inputs)
 
 
 def _calls(spec: Spec, work: Plan, row: int, random: np.random.Generator) -> list[Call]:
@@ -196,14 +199,13 @@ def _calls(spec: Spec, work: Plan, row: int, random: np.random.Generator) -> lis
     calls: list[Call] = []
     if work.step[row]:
         calls.append(Call(u=u, dt=float(work.dt[row]) if run_time else None))
-    first = 0
-    for i, sensor in enumerate(spec.measurements):
-        last = first + len(sensor.components)
+    for i, (sensor, place) in enumerate(readings_of(spec)):
         if work.mask[row, i]:
+            m = len(sensor.components)
             masked = sensor.partial and random.random() < 0.2
-            mask = int(random.integers(0, 1 << (last - first))) if masked else None
-            calls.append(Call(sensor.name, work.z[row, first:last], u, mask=mask))
-        first = last
+            mask = int(random.integers(0, 1 << m)) if masked else None
+            z, own = np.split(work.z[row, place], [m])
+            calls.append(Call(sensor.name, z, u, mask=mask, inputs=own if sensor.inputs else None))
     return calls
 
 
@@ -249,19 +251,20 @@ class _Scales:
     """What errors are measured by; it learns magnitudes along the track."""
 
     def __init__(self, kf: NativeFilter, ref: ReferenceFilter) -> None:
-        self.names = list(kf.states)
+        self._space = ref.model.space
+        self.names = list(self._space.errors)
         n = len(self.names)
         self._upper = np.triu_indices(n)
         self.pairs = [f"{self.names[i]}, {self.names[j]}" for i, j in zip(*self._upper, strict=True)]
-        self._parts = [part_of(ref.model.periods.get(i)) for i in range(n)]
+        self._periods = ref.model.turns
         dtype = kf.struct.value.dtype
         floating = dtype.kind == "f"
         self._dtype = dtype if floating else np.dtype(np.float64)
         self._lsb = None if floating else kf.struct.units.x
         self._P_lsb = 0.0 if floating else kf.struct.units.P
         self._relative = 8 * float(np.finfo(dtype).eps) if floating else 0.0
-        self._absolute = np.zeros(n) if floating else 4 * kf.struct.units.x
-        self._magnitude = np.abs(ref.x)
+        self._absolute = np.zeros(n) if floating else 4 * kf.struct.units.errors
+        self._magnitude = self._space.size(ref.x)
         self._variance = np.diag(ref.P).copy()
 
     def rounded(self, x: Array) -> Array:
@@ -274,8 +277,10 @@ class _Scales:
 
     def x_errors(self, x: Array, truth: Array, P: Array) -> Array:
         """Errors [n] in sigma; of a state that is known exactly, relative to its magnitude."""
-        self._magnitude = np.maximum(self._magnitude, np.abs(truth))
-        error = np.array([part.local(a, b) for part, a, b in zip(self._parts, x, truth, strict=True)])
+        self._magnitude = np.maximum(self._magnitude, self._space.size(truth))
+        error = self._space.difference(x, truth)
+        for i, period in self._periods.items():
+            error[i] = part_of(period).local(float(error[i]), 0.0)
         beyond = np.maximum(np.abs(error) - self._absolute - self._relative * self._magnitude, 0.0)
         sigma = np.sqrt(np.maximum(np.diag(P), 0.0))
         scale = np.where(sigma > 0, sigma, np.where(self._magnitude > 0, self._magnitude, 1.0))

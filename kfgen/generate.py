@@ -143,9 +143,9 @@ def summary(code: FilterCode, view: View) -> Summary:
             rows.append((function.name, counts or {}))
     notes = [code.description]
     if code.order != tuple(range(len(code.order))):
-        notes.append("inner order: " + " ".join(code.model.states[i] for i in code.order))
+        notes.append("inner order: " + " ".join(code.model.errors[i] for i in code.order))
     for mode in code.modes:
-        inner = " ".join(code.model.states[i] for i in mode.order)
+        inner = " ".join(code.model.errors[i] for i in mode.order)
         order = "" if mode.order == code.order else f"; inner order: {inner}"
         notes.append(f"{mode.name}: {mode.description}{order}")
     notes += code.remarks

@@ -119,7 +119,9 @@ def _state(axes: Any, spec: Spec, log: Log, result: RunResult, i: int, keep: sli
     state = spec.states[i]
     period = math.inf if state.period is None else float(value(state.period.tree, spec))
     t, x = result.t[keep], result.x[keep, i]
-    sigma = np.sqrt(np.maximum(result.var[keep, i], 0.0))
+    sigma = np.zeros_like(x)
+    if state.name in spec.errors:  # the numbers of a quaternion have no variance of their own
+        sigma = np.sqrt(np.maximum(result.var[keep, spec.errors.index(state.name)], 0.0))
     axes.fill_between(t, x - 2 * sigma, x + 2 * sigma, color=BAND, alpha=0.55, linewidth=0, label="2 sigma")
     for column in measured_as(spec, state.name):
         if column in log.columns:

@@ -22,7 +22,8 @@ class Named:
 class SensorView:
     name: str
     NAME: str
-    components: tuple[Named, ...]
+    components: int
+    fields: tuple[Named, ...]  # the components, and what else comes with a measurement
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ class View:
     ram: int
     scalar: ScalarView
     states: tuple[Named, ...]
+    errors: tuple[Named, ...]  # of the error coordinates; empty where they are the states
     state_table: tuple[str, ...]
     reference: tuple[Data, ...]
     cost_table: tuple[str, ...]
@@ -97,6 +99,7 @@ class View:
     inputs: tuple[Named, ...]
     sensors: tuple[SensorView, ...]
     parameters: tuple[Named, ...]
+    outputs: tuple[Named, ...]
     modes: tuple[Struct, ...]
     fields: tuple[Field, ...]
     statuses: tuple[Named, ...]

@@ -49,6 +49,22 @@ def indices(prefix: str, states: Iterable[Quantity]) -> tuple[Named, ...]:
     )
 
 
+def errors(prefix: str, code: FilterCode) -> tuple[Named, ...]:
+    """The enumerators of the error coordinates, where they are not the states."""
+    spec = code.model.spec
+    if not spec.rotations:
+        return ()
+    sides = {"body": "in the body's frame", "reference": "in the reference frame"}
+    rows = {s.name: Named(s.name, about(s.unit, s.doc)) for s in spec.states}
+    for r in spec.rotations:
+        rows |= {e: Named(e, about("rad", f"of {r.name}, {sides[r.error]}")) for e in r.errors}
+    named = [replace(rows[e], index_name=f"{prefix}_ERROR_{e.upper()}") for e in spec.errors]
+    width = max(len(r.index_name) for r in named)
+    return tuple(
+        replace(r, comment=_behind(r.comment, width - len(r.index_name) + 2 - (r is not named[-1]))) for r in named
+    )
+
+
 def _behind(comment: str, blanks: int) -> str:
     return " " * blanks + f"/* {comment} */" if comment else ""
 
@@ -81,7 +97,7 @@ def cost_table(costs: Mapping[str, str]) -> list[str]:
 
 def reference(code: FilterCode) -> Iterator[Data]:
     """The blocks of the header's comment that say what the filter is made of: inner orders, modes, the step."""
-    names = [s.name for s in code.model.spec.states]
+    names = code.model.spec.errors
     yield from _order("order of the states inside U and D", code.order, names)
     if code.modes:
         lines = [line for mode in code.modes for line in fill(f"{mode.name}: {mode.description}", _REFERENCE_WIDTH)]

@@ -58,13 +58,17 @@ def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPo
             scalar.literal(Fraction(0)), scalar.literal(Fraction(1)), scalar.function("ceil"),
         ),
         states=header.indices(NAME, spec.states),
+        errors=header.errors(NAME, code),
         state_table=tuple(header.state_table(code)),
         reference=tuple(reference),
         cost_table=tuple(header.cost_table(maker.costs)),
         advice=code.notes,
         inputs=header.members(spec.inputs),
-        sensors=tuple(SensorView(s.name, s.name.upper(), header.members(s.components)) for s in spec.measurements),
+        sensors=tuple(
+            SensorView(s.name, s.name.upper(), len(s.components), header.members(s.fields)) for s in spec.measurements
+        ),
         parameters=header.members(spec.parameters),
+        outputs=header.members(spec.outputs),
         modes=struct.modes(name, code.blocks),
         fields=struct.fields(name, code.blocks, bool(spec.parameters)),
         statuses=tuple(header.statuses()),

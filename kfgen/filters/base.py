@@ -9,6 +9,7 @@ from fractions import Fraction
 from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import Argument, Function
 from kfgen.model import Model
+from kfgen.model.model import SensorModel
 
 
 @dataclass(frozen=True)
@@ -67,3 +68,8 @@ DT = Argument("dt", "{name}_real_t", pointer=False, doc="time step [s]")
 
 def sensor_argument(sensor: str) -> Argument:
     return Argument("z", "{name}_" + sensor + "_t", pointer=True, doc="measurement")
+
+
+def image_of(sensor: SensorModel) -> str:
+    """The name of an array of what is measured at a point: z, where that is not the measurement itself."""
+    return "seen_z" if sensor.inputs else "z"

@@ -25,7 +25,7 @@ from kfgen.filters.covariance.parts import GainChange
 from kfgen.filters.frame.shared import unused
 from kfgen.filters.kinds.single import SingleFilter
 from kfgen.filters.kinds.steady import Steady
-from kfgen.filters.order import best_order
+from kfgen.filters.order import best_order, upper_order
 from kfgen.filters.steps import process
 from kfgen.filters.steps.sensor import SensorCode
 from kfgen.ir.nodes import Constants, Table
@@ -138,7 +138,7 @@ def _in_loops(
     weighted = any(o.influence is not None for model in models for o in model.every_options)
     out = []
     for place, (model, form) in enumerate(zip(models, forms, strict=True)):
-        names = [model.states[i] for i in form.order]
+        names = [model.errors[i] for i in form.order]
         table = (model.spec.name, f"reach_{modes[place]}" if modes else "reach")
         how = Looping(names, kernels, weighted, steps, table)
         out.append(looped(model.spec.filter.covariance, form, how))
@@ -147,7 +147,7 @@ def _in_loops(
 
 def _form(model: Model, scalar: Scalar, order: list[int] | None = None) -> Form[Any]:
     """How the covariance is kept, in straight-line code. order: of the states inside, where that is given."""
-    n, chosen = len(model.states), model.spec.filter
+    n, chosen = len(model.errors), model.spec.filter
 
     def ordered() -> list[int]:
         if chosen.type == "ukf":  # sigma points depend on the order
@@ -173,7 +173,10 @@ def _check_measurements(model: Model) -> None:
     mistakes = []
     for sensor in model.sensors:
         rows = linearise_rows(Trace(), model, sensor)
-        for component, row in zip(sensor.spec.components, rows, strict=True):
+        components = {c.name: c for c in sensor.spec.components}
+        components |= {e: components[r.parts[0]] for r in sensor.rotations for e in r.errors}
+        for name, row in zip(sensor.errors, rows, strict=True):
+            component = components[name]
             if all(is_zero(h) for h in row):
                 mistakes.append(
                     Mistake(
@@ -188,24 +191,25 @@ def _check_measurements(model: Model) -> None:
 
 def linearise_rows(t: Trace, model: Model, sensor: Any) -> list[list[Any]]:
     """H alone, before decorrelation."""
-    m, q = len(sensor.h), len(sensor.noises)
+    m, q = sensor.dimension, len(sensor.noises)
     plain = replace(
-        sensor, R=((sympy.S.Zero,) * m,) * m, noise_covariance=((sympy.S.Zero,) * q,) * q, residual=(None,) * m,
+        sensor, R=((sympy.S.Zero,) * m,) * m, noise_covariance=((sympy.S.Zero,) * q,) * q,
+        residual=(None,) * len(sensor.h),
     )  # fmt: skip
-    code = SensorCode(t, model, plain, list(range(len(model.states))))
+    code = SensorCode(t, model, plain, list(range(len(model.errors))))
     return code.linearise(code.prior()).H
 
 
 def _common_order(models: tuple[Model, ...]) -> list[int]:
     """One order for all modes of a bank: factors of the same order mix for the least."""
     if any(model.spec.filter.type == "ukf" and model.spec.filter.covariance == "ud" for model in models):
-        return list(range(len(models[0].states)))
+        return list(range(len(models[0].errors)))
     return _order(models)
 
 
 def _order(models: tuple[Model, ...]) -> list[int]:
     """The cheapest inner order; the spec's where D is limited, since D depends on the order."""
-    n = len(models[0].states)
+    n = len(models[0].errors)
     if n == 1 or any(v is not None for model in models for v in (*model.floors, *model.ceilings)):
         return list(range(n))
     F: list[set[int]] = [set() for _ in range(n)]
@@ -223,12 +227,17 @@ def _order(models: tuple[Model, ...]) -> list[int]:
                 touched = {j for j in range(n) if not is_zero(row[j])}
                 if model is models[0] or touched not in measured:
                     measured.append(touched)
+    if models[0].rotations:
+        blocks = [range(r.first_error, r.first_error + 3) for r in models[0].rotations]
+        found = upper_order(F, blocks)
+        if found is not None:
+            return found
     return best_order(F, noisy, measured)
 
 
 def _private_words(spec: Spec, scalar: Scalar) -> set[str]:
     """What follows the filter's name in the names of its helpers, private functions and tables."""
-    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach", "draws"}
+    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach", "draws", "isolate", "isolate_root"}
     words |= {f"{kind}_{sensor.name}" for kind in ("h", "see", "recall") for sensor in spec.measurements}
     modes = spec.imm.modes if spec.imm else ()
     return words | {f"{word}_{mode.name}" for word in words for mode in modes}

@@ -46,6 +46,33 @@ def best_order(F: list[set[int]], noisy: set[int], measured: list[set[int]]) -> 
     return best
 
 
+def upper_order(F: list[set[int]], blocks: list[range]) -> list[int] | None:
+    """An order in which F is upper triangular, but for blocks of states that stand together; None: there is none.
+
+    Column k of F U then ends at its own pivot, or in its block. What no other state uses and uses none comes first,
+    since a noise costs all before it; else the spec's order stays.
+    """
+    n = len(F)
+    block_of = {i: block[0] for block in blocks for i in block}
+    unit = [block_of.get(i, i) for i in range(n)]
+    users: dict[int, set[int]] = {u: set() for u in unit}  # what has to come before: the rows that use a state
+    for i, row in enumerate(F):
+        for j in row:
+            if unit[i] != unit[j]:
+                users[unit[j]].add(unit[i])
+    order: list[int] = []
+    placed: set[int] = set()
+    while len(placed) < len(users):
+        ready = [u for u in users if u not in placed and users[u] <= placed]
+        if not ready:
+            return None
+        alone = [u for u in ready if F[u] == {u} and not any(u in row for i, row in enumerate(F) if i != u)]
+        chosen = min(alone or ready)
+        placed.add(chosen)
+        order += [i for i in range(n) if unit[i] == chosen]
+    return order
+
+
 def _cost(order: list[int], columns: list[set[int]], noisy: set[int], measured: list[set[int]], limit: int) -> int:
     """The cost of an order, or at least `limit` where it is no better."""
     position = {state: k for k, state in enumerate(order)}

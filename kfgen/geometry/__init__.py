@@ -7,5 +7,8 @@ fractions or floats. The reference has a geometry of its own.
 from kfgen.geometry.circle import Circle
 from kfgen.geometry.line import Line
 from kfgen.geometry.part import Part, heaviest, part_of
+from kfgen.geometry.rotation import Rotation
+from kfgen.geometry.space import Space
+from kfgen.geometry.turn import Turn, turn_of
 
-__all__ = ["Circle", "Line", "Part", "heaviest", "part_of"]
+__all__ = ["Circle", "Line", "Part", "Rotation", "Space", "Turn", "heaviest", "part_of", "turn_of"]

@@ -11,7 +11,7 @@ from typing import Any
 
 import sympy
 
-from kfgen.ir import constants
+from kfgen.ir import constants, turning
 from kfgen.ir.nodes import Table
 from kfgen.ir.trace import Trace, Value
 
@@ -141,6 +141,12 @@ class Lowering:
             case "Norm":
                 squares = [self._integer_power(self(a), 2) for a in args]
                 return t.function("sqrt", sum(squares[1:], squares[0]))
+            case "Stumpff":
+                return turning.stumpff(t, int(args[0]), self(args[1]))
+            case "LogScale":
+                return turning.log_scale(t, self(args[0]), self(args[1]))
+            case "LogSlope":
+                return turning.log_slope(t, self(args[0]), self(args[1]))
             case "Table" | "Slope":
                 count = (len(args) - 1) // 2
                 data = [self(a).constant for a in args[1:]]

@@ -106,8 +106,9 @@ class Trace:
 
     in_place = True  # what is loaded is what stands where it will be stored
 
-    def __init__(self, smallest: Fraction | int = 0) -> None:
+    def __init__(self, smallest: Fraction | int = 0, epsilon: Fraction = Fraction(1, 2**52)) -> None:
         self.smallest = smallest  # a number not above it counts as zero where it divides
+        self.epsilon = epsilon  # relative spacing of the numbers at 1
         self.pool = RecordingPool()
         self.blocks: dict[int, Block] = {}  # id(For or If) -> its recorded body
         self.raised: list[tuple[Value, str]] = []  # conditions of warnings, and which
@@ -174,6 +175,10 @@ class Trace:
     def bit(self, path: str, place: int) -> Value:
         """Whether a bit of an integer argument is set."""
         return self.wrapped(self.pool.make("bit", (), (path, place), BOOL))
+
+    def present(self, argument: str) -> Value:
+        """Whether an optional argument is given."""
+        return self.wrapped(self.pool.make("present", (), argument, BOOL))
 
     def name(self, value: Value, name: str) -> Value:
         """Keep a value under a name of the model; constants and what has a name keep theirs."""

@@ -10,7 +10,9 @@ import sympy
 
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
-from kfgen.model.model import Model, SensorModel, build_model
+from kfgen.model.builder import build_model
+from kfgen.model.first import build_firsts
+from kfgen.model.model import Model, SensorModel
 from kfgen.model.symbolic import to_sympy
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.types import Spec
@@ -70,7 +72,9 @@ def build_bank(spec: Spec) -> BankModel:
     mu0 = [number(e.tree) for e in imm.mu0]
     mu = tuple(m / sum(mu0) for m in mu0)
     time = any(model.uses_time() for model in models)
-    head = replace(first, spec=spec, x0=_combined(models, mu), keeps_time=time)
+    head = replace(
+        first, spec=spec, x0=_combined(models, mu), keeps_time=time, firsts=build_firsts(spec, names),
+    )  # fmt: skip
     return BankModel(
         head=head,
         modes=models,
@@ -84,8 +88,10 @@ def build_bank(spec: Spec) -> BankModel:
 def _combined(models: tuple[Model, ...], mu: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
     """The mean of the modes' x0, about that of the largest weight."""
     heaviest = models[max(range(len(mu)), key=lambda i: (mu[i], -i))]
-    out = []
-    for k, (part, base) in enumerate(zip(heaviest.parts, heaviest.x0, strict=True)):
-        shift = sum((m * part.local(model.x0[k], base) for model, m in zip(models, mu, strict=True)), Fraction(0))
-        out.append(base + shift)
+    space, base = heaviest.space, heaviest.space.normalised(heaviest.x0)
+    apart = [space.local(space.normalised(model.x0), base) for model in models]
+    shift = [sum((m * d[j] for m, d in zip(mu, apart, strict=True)), Fraction(0)) for j in range(space.dimension)]
+    out = space.retract(base, shift)
+    for i, j, _ in space.singles:
+        out[i] = heaviest.x0[i] + shift[j]
     return tuple(out)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
 import sympy
 
 from kfgen.model import functions as kf
+from kfgen.model import turning
+from kfgen.model.rotations import Names, entries, gathered
 from kfgen.spec.tree import Call, Name, Number, Tree, names
 from kfgen.spec.types import Constant
 
@@ -20,13 +22,29 @@ def to_sympy(tree: Tree, known: Mapping[str, Any]) -> Any:
     if isinstance(tree, Number):
         return sympy.Rational(tree.value.numerator, tree.value.denominator)
     if isinstance(tree, Name):
-        if tree.name == "pi":
+        if tree.name == "pi" and "pi" not in known:
             return sympy.pi
         if tree.name == "e" and "e" not in known:
             return sympy.E
         return known[tree.name]
     assert isinstance(tree, Call)
+    registry = known.registry if isinstance(known, Names) else None
+    if tree.op == "rotation":
+        i, j = (int(a.value) for a in tree.args[:2] if isinstance(a, Number))
+        numbers = [to_sympy(argument, known) for argument in tree.args[2:]]
+        return entries(numbers)[i][j] if registry is None else registry.entry(numbers, i, j)
+    if registry is not None and registry.quartets and tree.op in ("add", "sub"):
+        return gathered(registry, sympy.Add(*_terms(tree, 1, known)))
     return _CALLS[tree.op](*[to_sympy(argument, known) for argument in tree.args])
+
+
+def _terms(tree: Tree, sign: int, known: Mapping[str, Any]) -> Iterator[Any]:
+    """The terms of a sum of sums."""
+    if isinstance(tree, Call) and tree.op in ("add", "sub"):
+        yield from _terms(tree.args[0], sign, known)
+        yield from _terms(tree.args[1], sign if tree.op == "add" else -sign, known)
+    else:
+        yield sign * to_sympy(tree, known)
 
 
 def constants(entries: Iterable[Constant], value: Callable[[Any], Fraction | None]) -> dict[str, Any]:
@@ -91,4 +109,7 @@ _CALLS: dict[str, Callable[..., Any]] = {
     "floor": kf.Floor,
     "where": kf.Where,
     "table": kf.Table,
+    "rotation": turning.entry,
+    "rotation_vector": turning.rotation_vector,
+    "from_rotation_vector": turning.from_rotation_vector,
 }  # fmt: skip

@@ -48,9 +48,9 @@ class Adaptation:
         if learnt:
             sensors = [SensorModel(model, sensor) for sensor in learnt]
             R = {sensor.name: sensor.noise(model.x0, context) for sensor in sensors}
-            adapted = replace(adapted, R=R, e={sensor.name: np.zeros(sensor.m) for sensor in sensors})
+            adapted = replace(adapted, R=R, e={sensor.name: np.zeros(sensor.space.k) for sensor in sensors})
         if self.Q:
-            Q = model.covariance(model.spec.dynamics.Q, model.states)
+            Q = model.covariance(model.spec.dynamics.Q, model.errors)
             adapted = replace(adapted, Q=symmetric(Q(model.environment(context, model.x0))))
         return adapted
 
@@ -60,7 +60,7 @@ class Adaptation:
 
         Of what is not in use nothing is learnt; its correlations with the others are forgotten.
         """
-        name, used = reading.sensor.name, list(reading.used)
+        name, used = reading.sensor.name, list(reading.rows)
         R, e = adapted.R[name].copy(), adapted.e[name][used]
         others = [i for i in range(len(R)) if i not in used]
         R[np.ix_(used, used)] = (1.0 - self._a) * R[np.ix_(used, used)] + self._a * (spread + np.outer(e, e))
@@ -72,7 +72,7 @@ class Adaptation:
         """Keeps the R (m, m) of an update that was made, and its residual (k), z - h(x) at the x it stored."""
         name = reading.sensor.name
         e = adapted.e[name].copy()
-        e[list(reading.used)] = residual
+        e[list(reading.rows)] = residual
         return replace(adapted, R={**adapted.R, name: R}, e={**adapted.e, name: e})
 
     def with_steps(self, adapted: Adapted, steps: Matrix) -> Adapted:

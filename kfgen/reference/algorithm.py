@@ -16,7 +16,7 @@ from kfgen.reference.adapt import NOTHING, Adaptation, Adapted
 from kfgen.reference.dual import Matrix, Vector, value_of
 from kfgen.reference.evaluate import Closure
 from kfgen.reference.gates import Gates
-from kfgen.reference.linalg import lower_root, udu
+from kfgen.reference.linalg import lower_root, symmetric, udu
 from kfgen.reference.model import Context, Model
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
@@ -27,7 +27,7 @@ from kfgen.spec.types import Filter
 
 @dataclass(frozen=True)
 class Estimate:
-    """x (n), P (n, n), and whatever else the algorithm keeps between two steps.
+    """x (nx), P (n, n), and whatever else the algorithm keeps between two steps.
 
     memory: what belongs to this very x and P, and is dropped when either is set. adapted: noise covariances
     learnt so far, which outlast that.
@@ -98,11 +98,15 @@ class Estimator(ABC):
 
     @abstractmethod
     def placed(self, estimate: Estimate, change: Callable[[Vector], Vector]) -> Estimate:
-        """The estimate with x (n), or the x of every filter of a bank, changed; the covariance stays."""
+        """The estimate with x (nx), or the x of every filter of a bank, changed; the covariance stays."""
 
     @abstractmethod
     def with_covariance(self, estimate: Estimate, P: Matrix) -> Estimate:
         """The estimate with P (n, n) for its covariance, or for that of every filter of a bank; x stays."""
+
+    @abstractmethod
+    def respread(self, estimate: Estimate, change: Callable[[Matrix], Matrix]) -> Estimate:
+        """The estimate with P (n, n), or the P of every filter of a bank, changed; x stays."""
 
     @abstractmethod
     def redrawn(self, estimate: Estimate) -> Estimate:
@@ -141,6 +145,9 @@ class Algorithm(Estimator):
     def with_covariance(self, estimate: Estimate, P: Matrix) -> Estimate:
         return replace(estimate, P=P, memory=None)
 
+    def respread(self, estimate: Estimate, change: Callable[[Matrix], Matrix]) -> Estimate:
+        return self.with_covariance(estimate, change(estimate.P))
+
     def redrawn(self, estimate: Estimate) -> Estimate:
         return replace(estimate, memory=None)
 
@@ -156,10 +163,23 @@ class Limits:
         self._ceiling = self._compile(options.variance_ceiling)
 
     def _compile(self, entries: Mapping[str, Expression]) -> dict[int, Closure]:
-        return {self.model.index[name]: self.model.scope.compile(entry) for name, entry in entries.items()}
+        return {self.model.row[name]: self.model.scope.compile(entry) for name, entry in entries.items()}
+
+    def corrected(self, x: Vector, P: Matrix, d: Vector, context: Context) -> tuple[Vector, Matrix, Status]:
+        """What an update stores that moves x (nx) by the error d (n): x [+] d, and P (n, n) as seen from there.
+
+        Raises StepError NOT_FINITE.
+        """
+        space = self.model.space
+        if not np.isfinite(d).all():
+            raise StepError(Status.NOT_FINITE)
+        if space.rotations:
+            T = space.turned(d, always=False)
+            P = symmetric(T @ P @ T.T)
+        return self.finish(space.moved(x, d), P, context)
 
     def finish(self, x: Vector, P: Matrix, context: Context) -> tuple[Vector, Matrix, Status]:
-        """The x (n) and P (n, n) that a step stores; REGULARIZED where a variance met its floor or ceiling.
+        """The x (nx) and P (n, n) that a step stores; REGULARIZED where a variance met its floor or ceiling.
 
         Raises StepError NOT_FINITE.
         """

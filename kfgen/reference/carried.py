@@ -1,8 +1,9 @@
 """Which noise inputs a sigma-point filter carries as dimensions of its points, and which images it wraps.
 
 A noise that only shifts the result by a constant multiple of itself is as well served by G Qw G^T. Carried are
-those by which the derivative contains states or noises, and what is correlated with them. Noises given by a
-density are not carried: they have no value to hold over a step.
+those by which the derivative contains states or noises, and what is correlated with them. The attitude is none of these
+states where a noise enters only as rotate(q, w), or in a quaternion's rate. Noises given by a density are not carried:
+they have no value to hold over a step.
 
 An image that is linear in the periodic states and does not jump is not wrapped: its spread may exceed a period.
 Both are decided by the structure of the formulas: see `shapes`.
@@ -23,7 +24,7 @@ def carried_by_process(model: Model) -> tuple[str, ...]:
     held = [noise.name for noise in spec.noise if not noise.density]
     if spec.filter.augment:
         return tuple(held)
-    bent = _bent(Formulas(model, held).step().values())
+    bent = _bent(Formulas(model, held, turning=False).step().values())
     return _with_correlated(model, bent, spec.noise, spec.noise_covariance)
 
 
@@ -32,15 +33,15 @@ def carried_by_sensor(model: Model, sensor: Sensor) -> tuple[str, ...]:
     names = [noise.name for noise in sensor.noise]
     if model.spec.filter.augment:
         return tuple(names)
-    bent = _bent(_predicted(model, sensor))
+    bent = _bent(_predicted(model, sensor, turning=False))
     return _with_correlated(model, bent, sensor.noise, sensor.noise_covariance)
 
 
 def wrapped_by_process(model: Model) -> tuple[int, ...]:
-    """The periodic states whose images have to be wrapped."""
+    """The periodic states (their indices in P) whose images have to be wrapped."""
     held = [noise.name for noise in model.spec.noise if not noise.density]
     after = Formulas(model, held).step()
-    return tuple(i for i in model.periods if _turns(model, after[model.states[i]]))
+    return tuple(i for i in model.turns if _turns(model, after[model.errors[i]]))
 
 
 def wrapped_by_sensor(model: Model, sensor: Sensor) -> tuple[int, ...]:
@@ -53,9 +54,9 @@ def _turns(model: Model, shape: Shape) -> bool:
     return shape.jumps or any(shape.slopes.get(model.states[i]) for i in model.periods)
 
 
-def _predicted(model: Model, sensor: Sensor) -> list[Shape]:
+def _predicted(model: Model, sensor: Sensor, turning: bool = True) -> list[Shape]:
     """The shapes of the components of a sensor."""
-    formulas = Formulas(model, [noise.name for noise in sensor.noise])
+    formulas = Formulas(model, [noise.name for noise in sensor.noise], turning)
     point = formulas.point()
     return [formulas.shape(component.h.tree, point) for component in sensor.components]
 

@@ -15,7 +15,7 @@ from kfgen.reference.sigma_points import ROOTS, Images, PointSet, SigmaRule
 class Cloud:
     """N points around an estimate.
 
-    points (N, n): where functions are evaluated, within the states' bounds, angles not wrapped. noise (N, q): the
+    points (N, nx): where functions are evaluated, within the states' bounds, angles not wrapped. noise (N, q): the
     values of the carried noises that belong to them. states: the points as they are averaged, before they were
     brought within the bounds.
     """
@@ -44,13 +44,14 @@ class Drawing:
         self._root = ROOTS[model.spec.filter.covariance]
 
     def draw(self, x: Vector, P: Matrix, C: Matrix) -> Cloud:
-        """Points of x (n), P (n, n) and of the carried noises, mean 0, covariance C (q, q).
+        """Points of x (nx), P (n, n) and of the carried noises, mean 0, covariance C (q, q).
 
         The bounds move the places where functions are evaluated, not the deviations: weighted with those, P and
         the covariances of whatever is computed at the points remain the covariance of something.
         """
-        n = self.model.n
+        n, space = self.model.n, self.model.space
         weights = self.rule.points(n + len(C))
         deviations = weights.offsets[:, :n] @ self._root(P).T
         noise = weights.offsets[:, n:] @ self._root(C).T
-        return Cloud(self.model.clip(x + deviations), noise, Images(weights, x, deviations, np.zeros(n)))
+        points = np.array([self.model.clip(space.moved(x, deviation)) for deviation in deviations])
+        return Cloud(points, noise, Images(weights, x, deviations, np.zeros(n)))

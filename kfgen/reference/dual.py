@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.reference.functions import BINARY, UNARY, divide, power
+from kfgen.reference.functions import BINARY, UNARY, Function1, Function2, divide, power
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -150,7 +150,11 @@ def quotient(a: Number, b: Number) -> Number:
 
 def apply1(name: str) -> Callable[[Number], Number]:
     """The function of one argument of that name, on numbers."""
-    function, slope, bend = UNARY[name]
+    return lifted1(*UNARY[name])
+
+
+def lifted1(function: Function1, slope: Function1, bend: Function1) -> Callable[[Number], Number]:
+    """A function of one argument with its first and second derivative, on numbers."""
 
     def apply(x: Number) -> Number:
         if isinstance(x, Dual):
@@ -162,7 +166,13 @@ def apply1(name: str) -> Callable[[Number], Number]:
 
 def apply2(name: str) -> Callable[[Number, Number], Number]:
     """The function of two arguments of that name, on numbers."""
-    function, slopes, bends = BINARY[name]
+    return lifted2(*BINARY[name])
+
+
+def lifted2(
+    function: Function2, slopes: Callable[[float, float], tuple[float, float]], bends: Bends
+) -> Callable[[Number, Number], Number]:
+    """A function of two arguments with its gradient and its second derivatives, on numbers."""
 
     def apply(a: Number, b: Number) -> Number:
         va, vb = value_of(a), value_of(b)

@@ -65,7 +65,7 @@ class Ekf(Algorithm):
         H, R, noise = linear.H, linear.R, None
         if self.adaptation.R:
             noise = self.adaptation.noise(estimate.adapted, reading, H @ estimate.P @ H.T)
-            R = symmetric(noise[np.ix_(reading.used, reading.used)] + linear.inputs)
+            R = symmetric(noise[np.ix_(reading.rows, reading.rows)] + linear.inputs)
         y = reading.sensor.innovation(linear.h, estimate.x, reading)
         plain = update(estimate.P, H, R, y, self.treatment.plain)
         if not math.isfinite(plain.nis):
@@ -73,21 +73,21 @@ class Ekf(Algorithm):
         return Innovation(plain.nis, Measured(y, H, R, noise, plain))
 
     def correct(self, estimate: Estimate, reading: Reading, innovation: Innovation) -> Correction:
-        """x <- x + K y, P in Joseph's form; then R and Q where they adapt."""
+        """x <- x [+] K y, P in Joseph's form, as seen from there; then R and Q where they adapt."""
         measured = innovation.detail
         assert isinstance(measured, Measured)
         result = measured.plain
         if not self.treatment.trivial:
             rules = self.treatment.rules(reading.context)
             result = update(estimate.P, measured.H, measured.R, measured.y, rules)
-        x, P, flags = self.limits.finish(estimate.x + result.dx, result.P, reading.context)
+        x, P, flags = self.limits.corrected(estimate.x, result.P, result.dx, reading.context)
         adapted = self._adapted(estimate.adapted, reading, measured.noise, x, result)
         return Correction(Estimate(x, P, adapted=adapted), result.log_likelihood, flags | result.flags)
 
     def _adapted(
         self, adapted: Adapted, reading: Reading, noise: Matrix | None, x: Vector, result: Update
     ) -> Adapted:
-        """What an update that stores x (n) leaves of the adapted covariances."""
+        """What an update that stores x (nx) leaves of the adapted covariances."""
         if noise is not None:
             adapted = self.adaptation.with_noise(adapted, reading, noise, reading.sensor.residual(x, reading))
         if self.adaptation.Q:

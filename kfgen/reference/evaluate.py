@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from kfgen.reference import dual
+from kfgen.reference import dual, rotations
 from kfgen.reference.dual import Number, value_of
-from kfgen.reference.exact import PI, E, Exact, fold, to_float
+from kfgen.reference.exact import PI, ROTATIONS, E, Exact, fold, to_float
 from kfgen.spec.tree import Call, Expression, Name, Tree
 from kfgen.spec.tree import Number as Literal
 
@@ -129,6 +129,8 @@ def _operation(call: Call, arguments: list[Closure]) -> Closure:
     op = call.op
     if op == "table":
         return _table(arguments)
+    if op in ROTATIONS:
+        return _rotation(call, arguments)
     if op == "where":
         condition, first, second = arguments
         return lambda environment: first(environment) if condition(environment) else second(environment)
@@ -150,6 +152,19 @@ def _operation(call: Call, arguments: list[Closure]) -> Closure:
         return lambda environment: compare(value_of(a(environment)), value_of(b(environment)))
     binary = _BINARY[op]
     return lambda environment: binary(a(environment), b(environment))
+
+
+def _rotation(call: Call, arguments: list[Closure]) -> Closure:
+    """A part of a rotation's matrix, vector or quaternion: the first arguments are the numbers of the part."""
+    counts = ROTATIONS[call.op]
+    place = [int(argument.value) for argument in call.args[:counts] if isinstance(argument, Literal)]
+    numbers = arguments[counts:]
+    if call.op == "rotation":
+        i, j = place
+        return lambda environment: rotations.entry(i, j, [number(environment) for number in numbers])
+    function = rotations.logarithm if call.op == "rotation_vector" else rotations.exponential
+    (k,) = place
+    return lambda environment: function([number(environment) for number in numbers])[k]
 
 
 def _table(arguments: list[Closure]) -> Closure:

@@ -84,6 +84,36 @@ def _table(x: Exact, *points: Exact) -> Exact:
     return heights[-1]
 
 
+def _rotation(i: Exact, j: Exact, w: Exact, *v: Exact) -> Exact:
+    """Row i, column j of the matrix of the unit quaternion (w, v)."""
+    add, multiply = _both(operator.add), _both(operator.mul)
+    if i == j:
+        a, b = (v[k] for k in range(3) if k != i)
+        return _both(operator.sub)(Fraction(1), multiply(Fraction(2), add(multiply(a, a), multiply(b, b))))
+    turned = multiply(w, v[3 - int(i) - int(j)])
+    turned = turned if (j - i) % 3 == 2 else -turned
+    return multiply(Fraction(2), add(multiply(v[int(i)], v[int(j)]), turned))
+
+
+def _rotation_vector(k: Exact, w: Exact, *v: Exact) -> Exact:
+    size = _MP.norm([_real(component) for component in v])
+    if size == 0:
+        return Fraction(0)
+    angle = 2 * _MP.atan2(size, abs(_real(w)))
+    return angle * (-1 if w < 0 else 1) * _real(v[int(k)]) / size
+
+
+def _from_rotation_vector(k: Exact, *d: Exact) -> Exact:
+    angle = _MP.norm([_real(component) for component in d])
+    if angle == 0:
+        return Fraction(int(k == 0))
+    return _MP.cos(angle / 2) if k == 0 else _real(d[int(k) - 1]) / angle * _MP.sin(angle / 2)
+
+
+# op -> how many of its arguments are the numbers of a part
+ROTATIONS = {"rotation": 2, "rotation_vector": 1, "from_rotation_vector": 1}
+
+
 def _elementary(name: str) -> Callable[..., Exact]:
     function = getattr(_MP, name)
     return lambda *arguments: function(*(_real(a) for a in arguments))
@@ -110,6 +140,9 @@ _ARITHMETIC: dict[str, Callable[..., Exact]] = {
     "max": lambda a, b: a if _both(operator.ge)(a, b) else b,
     "where": lambda condition, a, b: a if condition else b,
     "table": _table,
+    "rotation": _rotation,
+    "rotation_vector": _rotation_vector,
+    "from_rotation_vector": _from_rotation_vector,
 }
 _OPERATIONS = _ARITHMETIC | {
     name: _elementary(name)

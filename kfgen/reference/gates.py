@@ -37,10 +37,11 @@ class Gates:
         return Status.GATED if reset_after is None or rejected < reset_after else Status.ANOMALY
 
     def _threshold(self, reading: Reading) -> float:
-        """The formula of a sensor's gate, or its chi-square quantile with so many components."""
-        name, used = reading.sensor.name, len(reading.used)
+        """The formula of a sensor's gate, or its chi-square quantile with so many degrees of freedom."""
+        name, used = reading.sensor.name, len(reading.rows)
         if name in self._formulas:
-            value = value_of(self._formulas[name](self.model.environment(reading.context, self.model.x0)))
+            given = self.model.environment(reading.context, self.model.x0, own=reading.sensor.own)
+            value = value_of(self._formulas[name](given))
             if not math.isfinite(value):
                 raise StepError(Status.NOT_FINITE)
             return value

@@ -23,9 +23,10 @@ from kfgen.reference.status import Status, StepError
 
 @dataclass(frozen=True)
 class Predicted:
-    """A reading as a cloud predicts it: images of the points (N, k), their covariances with each other, spread (k, k),
-    with the state, cross (n, k), and with the carried noises, noise (q, k)."""
+    """A reading as a cloud predicts it: its mean; images of the points (N, k) as seen from there, their covariances
+    with each other, spread (k, k), with the state, cross (n, k), and with the carried noises, noise (q, k)."""
 
+    mean: Vector
     images: Images
     spread: Matrix
     cross: Matrix
@@ -76,14 +77,14 @@ class Measuring:
             self._carried[sensor.name] = tuple(names.index(name) for name in carried)
 
     def draw(self, x: Vector, P: Matrix, reading: Reading) -> Cloud:
-        """Points of x (n), P (n, n) and of the sensor's carried noises. Raises StepError NOT_FINITE."""
+        """Points of x (nx), P (n, n) and of the sensor's carried noises. Raises StepError NOT_FINITE."""
         C = self._input_covariance(x, reading, self._carried[reading.sensor.name])
         return self.drawing.draw(x, P, C)
 
     def residual(self, x: Vector, P: Matrix, reading: Reading) -> Vector:
-        """The residual (k) of the reading against points drawn from x (n) and P (n, n). Raises NOT_FINITE."""
+        """The residual (k) of the reading against points drawn from x (nx) and P (n, n). Raises NOT_FINITE."""
         seen = self._predicted(x, reading, self.draw(x, P, reading))
-        return reading.sensor.innovation(seen.images.mean, x, reading)
+        return reading.sensor.innovation(seen.mean, x, reading)
 
     def whole(self, estimate: Estimate, reading: Reading, cloud: Cloud, noise: Matrix | None = None) -> Measured:
         """The innovation and its covariance S = R + spread of the predicted readings.
@@ -92,7 +93,7 @@ class Measuring:
         """
         seen = self._predicted(estimate.x, reading, cloud)
         R, noise = self._noise(estimate, reading, cloud, seen, noise)
-        y = reading.sensor.innovation(seen.images.mean, estimate.x, reading)
+        y = reading.sensor.innovation(seen.mean, estimate.x, reading)
         S = symmetric(seen.spread + R)
         if not np.isfinite(S).all():
             raise StepError(Status.NOT_FINITE)
@@ -120,7 +121,7 @@ class Measuring:
         C = self._input_covariance(estimate.x, reading, self._within(cloud, reading))
         H, M = regression(estimate.P, seen.cross), regression(C, seen.noise)
         R = symmetric(R + M @ C @ M.T)
-        y = reading.sensor.innovation(seen.images.mean, estimate.x, reading)
+        y = reading.sensor.innovation(seen.mean, estimate.x, reading)
         if not (np.isfinite(H).all() and np.isfinite(R).all()):
             raise StepError(Status.NOT_FINITE)
         check_covariance(C)
@@ -148,7 +149,7 @@ class Measuring:
         sensor, x, used = reading.sensor, estimate.x, reading.used
         if self.adaptation.R and noise is None:
             noise = self.adaptation.noise(estimate.adapted, reading, seen.spread)
-        R = sensor.noise(x, reading.context, used) if noise is None else noise[np.ix_(used, used)]
+        R = sensor.noise(x, reading.context, used) if noise is None else noise[np.ix_(reading.rows, reading.rows)]
         carried = self._within(cloud, reading)
         rest = [i for i in range(len(sensor.spec.noise)) if i not in carried]
         if rest:
@@ -156,7 +157,7 @@ class Measuring:
         return symmetric(R), noise
 
     def _predicted(self, x: Vector, reading: Reading, cloud: Cloud) -> Predicted:
-        """The reading that a cloud around x (n) predicts.
+        """The reading that a cloud around x (nx) predicts.
 
         Differences are those from the image of the point at the mean; a set without one has it evaluated beside, if
         a component is periodic or has its own residual. Linear ones are not wrapped; images that are the same but for
@@ -180,17 +181,21 @@ class Measuring:
         e = np.array([sensor.difference(z, base, x, reading, wrapped) for z in raw])
         e = np.where(np.max(np.abs(e), axis=0) <= self._rounding(reading, cloud, raw), 0.0, e)
         images = Images(cloud.weights, base, e, cloud.weights.wm @ e)
+        mean = reading.space.moved(base, images.d)
+        images = images.moved(reading.space.turned(images.d))
         spread = symmetric(images.covariance(images))
-        return Predicted(images, spread, cloud.states.covariance(images), cloud.noises.covariance(images))
+        return Predicted(mean, images, spread, cloud.states.covariance(images), cloud.noises.covariance(images))
 
     def _rounding(self, reading: Reading, cloud: Cloud, raw: Matrix) -> Vector:
         """By how much images (k) may differ by the rounding of what h adds up in them: |h| + |H| |x|.
 
         H is the smaller one of two points: a pole near one of them says nothing.
         """
+        space = reading.sensor.model.space
         H = np.fmin.reduce([np.abs(reading.sensor.jacobian(cloud.points[i], reading)) for i in (0, -1)])
-        terms: Vector = np.where(np.isfinite(H), H, 0.0) @ np.max(np.abs(cloud.points), axis=0)
-        size: Vector = 16.0 * EPS * (np.max(np.abs(raw), axis=0) + terms)
+        terms: Vector = np.where(np.isfinite(H), H, 0.0) @ np.max([space.size(point) for point in cloud.points], axis=0)
+        images = np.max([reading.space.size(image) for image in raw], axis=0)
+        size: Vector = 16.0 * EPS * (images + terms)
         return size
 
 

@@ -12,31 +12,37 @@ import numpy as np
 
 from kfgen.reference.algorithm import Estimate
 from kfgen.reference.dual import Matrix, Vector
+from kfgen.reference.linalg import symmetric
 from kfgen.reference.model import Model, wrap
 from kfgen.reference.status import Status, StepError
 
 
 def moments(model: Model, estimates: Sequence[Estimate], weights: Vector) -> tuple[Vector, Matrix]:
-    """The mean (n) and covariance (n, n) of a mixture of B estimates with weights (B) that sum to 1.
+    """The mean (nx) and covariance (n, n) of a mixture of B estimates with weights (B) that sum to 1.
 
-    x = x_b + sum_i w_i (x_i - x_b), P = sum_i w_i (P_i + d_i d_i^T), d_i = x_i - x. The base b is the estimate of
+    x = x_b [+] sum_i w_i (x_i [-] x_b), P = sum_i w_i (J_i P_i J_i^T + d_i d_i^T), d_i = x_i [-] x, where J_i moves
+    errors at x_i to x. The base b is the estimate of
     the largest weight, the first of equals: estimates that agree give exactly what they agree on. Differences
     of periodic states from the base are wrapped, d_i are those less their mean, not wrapped again: so the d_i
     have the mean 0 that a spread is taken about. An estimate of weight 0 has no part in it. May be not finite.
     """
+    space = model.space
     base = estimates[int(np.argmax(weights))].x
     part = [i for i, weight in enumerate(weights) if weight > 0.0]
     with np.errstate(all="ignore"):
-        differences = [estimates[i].x - base for i in part]
+        differences = [space.difference(estimates[i].x, base) for i in part]
         for difference in differences:
-            for k, period in model.periods.items():
+            for k, period in model.turns.items():
                 difference[k] = wrap(float(difference[k]), period)
         shift = np.sum([weights[i] * difference for i, difference in zip(part, differences, strict=True)], axis=0)
+        mean = space.moved(base, shift)
         P = np.zeros((model.n, model.n))
         for i, difference in zip(part, differences, strict=True):
-            d = difference - shift
-            P += weights[i] * (estimates[i].P + np.outer(d, d))
-    return model.wrap(base + shift), P
+            d, J = difference - shift, space.transport(estimates[i].x, mean)
+            for block in space.rotations:
+                d[block.errors] = space.difference(estimates[i].x, mean)[block.errors]
+            P += weights[i] * (J @ estimates[i].P @ J.T + np.outer(d, d))
+    return model.wrap(mean), symmetric(P)
 
 
 def transition_rows(M: Matrix) -> Matrix:

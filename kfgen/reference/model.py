@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +14,7 @@ from kfgen.reference.dual import Matrix, Number, Vector, value_of
 from kfgen.reference.evaluate import Closure, Environment, Scope
 from kfgen.reference.exact import Exact
 from kfgen.reference.linalg import check_covariance
+from kfgen.reference.manifold import Manifold
 from kfgen.reference.status import StepError
 from kfgen.spec.tree import Expression
 from kfgen.spec.types import Matrix as Formulas
@@ -28,13 +29,14 @@ class Context:
     """What a step is given beside the state.
 
     parameters: by name. u (nu): the inputs. t: seconds since init at the step's start (in an update: now).
-    dt: the step in s (0 in an update).
+    dt: the step in s (0 in an update). own: of an update, the sensor's own inputs.
     """
 
     parameters: Mapping[str, float]
     u: Vector
     t: float
     dt: float
+    own: Vector = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -59,9 +61,11 @@ class Model:
     """The state of a spec and the scope of its expressions.
 
     Attributes:
-        n, states, inputs: size of the state, names of the states and of the inputs.
-        periods: index of an angle or periodic state -> its period.
-        x0 (n), P0 (n, n): the initial estimate, wrapped.
+        space: the states and their errors. nx, n: how many numbers x has, and how many its error.
+        states, errors, inputs: their names.
+        row: error -> its index in P; index: state -> its index in x.
+        periods: index of an angle or periodic state -> its period; turns: the same by the index in P.
+        x0 (nx), P0 (n, n): the initial estimate, wrapped.
         values: the parameters' values in the spec.
     Raises SpecError where the initial covariance is none.
     """
@@ -70,7 +74,9 @@ class Model:
         self.spec = spec
         self.states = tuple(state.name for state in spec.states)
         self.inputs = tuple(entry.name for entry in spec.inputs)
-        self.n = len(self.states)
+        self.space = Manifold(self.states, spec.rotations)
+        self.nx, self.n, self.errors = self.space.n, self.space.k, self.space.errors
+        self.row = {name: i for i, name in enumerate(self.errors)}
         self.index = {name: i for i, name in enumerate(self.states)}
         constants = _constants(spec)
         parameters = tuple(parameter.name for parameter in spec.parameters)
@@ -80,8 +86,11 @@ class Model:
         }
         noises = [noise.name for sensor in spec.measurements for noise in sensor.noise]
         noises += [noise.name for noise in spec.noise]
+        # what comes with measurements; two sensors may call theirs alike
+        given = [entry.name for sensor in spec.measurements for entry in sensor.inputs]
+        given += [measured(sensor.name, c.name) for sensor in spec.measurements for c in sensor.components]
         own = ("t", "dt", Z, PREDICTED, INNOVATION)
-        self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, *own))
+        self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, *given, *own))
         self._noise_slots = tuple(self.scope.slots[name] for name in noises)
         self._state_slots = tuple(self.scope.slots[name] for name in self.states)
         self._input_slots = tuple(self.scope.slots[name] for name in self.inputs)
@@ -89,7 +98,8 @@ class Model:
             self.scope.define(definition.name, definition.value)
 
         self.periods = {i: self.number(state.period) for i, state in enumerate(spec.states) if state.period is not None}
-        low, high = np.full(self.n, -math.inf), np.full(self.n, math.inf)
+        self.turns = {self.row[self.states[i]]: period for i, period in self.periods.items()}
+        low, high = np.full(self.nx, -math.inf), np.full(self.nx, math.inf)
         for i, state in enumerate(spec.states):
             if state.bounds is not None:
                 low[i], high[i] = (self.number(bound) for bound in state.bounds)
@@ -107,9 +117,10 @@ class Model:
         return value_of(self.scope.compile(expression)(environment))
 
     def environment(
-        self, context: Context, x: Sequence[Number] | Vector, noise: Mapping[str, Number] | None = None
-    ) -> Environment:
-        """An environment with the states at x (n); noises are 0 unless given."""
+        self, context: Context, x: Sequence[Number] | Vector, noise: Mapping[str, Number] | None = None,
+        own: Sequence[str] = (),
+    ) -> Environment:  # fmt: skip
+        """An environment with the states at x (nx); noises are 0 unless given. own: names of the sensor's inputs."""
         environment, slots = self.scope.empty(), self.scope.slots
         for name, parameter in context.parameters.items():
             environment[slots[name]] = parameter
@@ -118,6 +129,8 @@ class Model:
         for slot, number in zip(self._state_slots, x.tolist() if isinstance(x, np.ndarray) else x, strict=True):
             environment[slot] = float(number) if isinstance(number, np.floating) else number
         environment[slots["t"]], environment[slots["dt"]] = context.t, context.dt
+        for name, entry in zip(own, context.own.tolist(), strict=bool(own)):
+            environment[slots[name]] = entry
         for slot in self._noise_slots:
             environment[slot] = 0.0
         for name, number in (noise or {}).items():
@@ -143,14 +156,14 @@ class Model:
         return self.covariance({e.name: e.variance for e in noise if e.variance is not None}, names)
 
     def wrap(self, x: Vector) -> Vector:
-        """x (n) with every periodic state brought into (-period/2, period/2]."""
-        x = x.copy()
+        """x (nx) with every periodic state brought into (-period/2, period/2], and quaternions of norm 1."""
+        x = self.space.normalised(x).copy()
         for i, period in self.periods.items():
             x[i] = wrap(float(x[i]), period)
         return x
 
     def clip(self, x: Vector) -> Vector:
-        """x (n) clipped to the states' bounds."""
+        """x (nx) clipped to the states' bounds."""
         return np.clip(x, self._low, self._high)
 
     def _initial_covariance(self) -> Matrix:
@@ -158,11 +171,14 @@ class Model:
         P = np.zeros((self.n, self.n))
         if spec.P0 is not None:
             P = np.array([[self.number(entry) for entry in row] for row in spec.P0])
-        for i, state in enumerate(spec.states):
-            if state.variance is not None:
-                P[i, i] = self.number(state.variance)
+        variances = {state.name: state.variance for state in spec.states if state.name in self.row}
+        for rotation in spec.rotations:
+            variances |= dict(zip(rotation.errors, rotation.variances, strict=True))
+        for name, variance in variances.items():
+            if variance is not None:
+                P[self.row[name], self.row[name]] = self.number(variance)
         for pair in spec.covariances:
-            i, j = self.index[pair.first], self.index[pair.second]
+            i, j = self.row[pair.first], self.row[pair.second]
             P[i, j] = P[j, i] = self.number(pair.value)
         try:
             check_covariance(P)
@@ -174,6 +190,11 @@ class Model:
                 "check variances and covariances",
             ) from None
         return P
+
+
+def measured(sensor: str, component: str) -> str:
+    """The variable of a component in what its first measurement sets: it hides what has its name outside."""
+    return f" {sensor}.{component}"
 
 
 def wrap(x: float, period: float) -> float:

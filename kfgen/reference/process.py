@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kfgen.errors import SpecError
 from kfgen.reference.dual import Dual, Matrix, Number, Vector, hessian, jacobian, values, variables
+from kfgen.reference.integrators import INTEGRATORS
 from kfgen.reference.linalg import check_covariance, symmetric
+from kfgen.reference.manifold import at_zero
 from kfgen.reference.model import Context, Model
 from kfgen.reference.reading import in_use
 from kfgen.reference.status import Status, StepError
 
 Numbers = list[Number]
-Derivative = Callable[[Numbers], Numbers]
 
 
 @dataclass(frozen=True)
 class Transition:
-    """A linearised step: x (n) the state after it, F (n, n) its Jacobian at the state before it, Q (n, n)
+    """A linearised step: x (nx) the state after it, F (n, n) its Jacobian at the state before it, Q (n, n)
     what it adds to the covariance: the additive noise and that of all noise inputs."""
 
     x: Vector
@@ -60,8 +61,10 @@ class Process:
         self._continuous = dynamics.form == "continuous"
         self._integrator = dynamics.integrator
         self._substeps = dynamics.substeps
-        self._f = [model.scope.compile(dynamics.f[name]) if name in dynamics.f else None for name in model.states]
-        self._Q = model.covariance(dynamics.Q, model.states)
+        # of a quaternion: its numbers after the step, or the three parts of the body's angular rate
+        moving = model.errors if self._continuous else model.states
+        self._f = [model.scope.compile(dynamics.f[name]) if name in dynamics.f else None for name in moving]
+        self._Q = model.covariance(dynamics.Q, model.errors)
         self._Qw = model.noise_covariance(in_use(spec, spec.noise, dynamics.f.values()), spec.noise_covariance)
         names = [noise.name for noise in spec.noise]
         self._held = [i for i, noise in enumerate(spec.noise) if not noise.density]
@@ -74,23 +77,25 @@ class Process:
                     raise SpecError.at(entry.place, "a noise per step cannot be correlated with a density")
 
     def linearise(self, x: Vector, context: Context, additive: Matrix | None = None) -> Transition:
-        """The step from x (n), with Jacobians and covariances at x; additive: instead of the spec's own Q (n, n).
+        """The step from x (nx), with Jacobians and covariances at x; additive: instead of the spec's own Q (n, n).
 
-        Q = additive Q + G Qw G^T for the noises per step, G = d x_next / dw, + for densities G Qc G^T dt with
-        G = df/dw at x, or, with the exact integrator, the integral of expm(A s) G Qc G^T expm(A s)^T over the
-        step (Van Loan 1978). Raises StepError: NOT_FINITE, or NOT_POSITIVE where Q or Qw is no covariance.
+        F and G are those of the error: d(f(x [+] d, w) [-] f(x, 0)) by d and w at 0. Q = additive Q + G Qw G^T for
+        the noises per step + for densities G Qc G^T dt with G = df/dw at x, or, with the exact integrator, the
+        integral of expm(A s) G Qc G^T expm(A s)^T over the step (Van Loan 1978). Raises StepError: NOT_FINITE, or
+        NOT_POSITIVE where Q or Qw is no covariance.
         """
         model, n = self.model, self.model.n
         environment = model.environment(context, x)
         Q, Qw = self._Q(environment) if additive is None else additive, self._Qw(environment)
         held = np.ix_(self._held, self._held)
         if self._continuous and self._integrator == "exact":
-            x_next, F, G = self._exact(x, np.zeros(len(self._held)), context)
+            x_next, F, G = self._exact(x, context)
         else:
-            joint = variables([*x, *np.zeros(len(self._held))])
-            after = self._advance(joint[:n], joint[n:], context)
-            derivatives = jacobian(after, n + len(self._held))
-            x_next, F, G = values(after), derivatives[:, :n], derivatives[:, n:]
+            joint = at_zero(n + len(self._held))
+            after = self._advance(model.space.plus(x.tolist(), joint[:n]), joint[n:], context)
+            x_next = values(after)
+            derivatives = jacobian(model.space.minus(after, x_next.tolist()), n + len(self._held))
+            F, G = derivatives[:, :n], derivatives[:, n:]
         added = Q + G @ Qw[held] @ G.T
         if self._white:
             added = added + self._diffusion(x, Qw[np.ix_(self._white, self._white)], context)
@@ -98,13 +103,14 @@ class Process:
             raise StepError(Status.NOT_FINITE)
         check_covariance(Q)
         check_covariance(Qw)
-        return Transition(x_next, F, symmetric(added))
+        return Transition(model.space.normalised(x_next), F, symmetric(added))
 
     def advance(self, x: Vector, w: Vector, context: Context) -> Vector:
-        """The state a step after x (n), the noises per step at w (in the spec's order); may be NaN."""
+        """The state a step after x (nx), the noises per step at w (in the spec's order); may be NaN."""
         if self._continuous and self._integrator == "exact":
             return self._advance_exact(x, w, context)
-        return values(self._advance([float(v) for v in x], [float(v) for v in w], context))
+        after = values(self._advance([float(v) for v in x], [float(v) for v in w], context))
+        return self.model.space.normalised(after)
 
     def expand(self, x: Vector, context: Context) -> Numbers:
         """The states after a step as second-order Duals in the joint variables (x, noises per step)."""
@@ -117,8 +123,10 @@ class Process:
         """F (n, n) at x (n); may be NaN."""
         still = np.zeros(len(self._held))
         if self._continuous and self._integrator == "exact":
-            return self._exact(x, still, context)[1]
-        return jacobian(self._advance(variables(x), [float(v) for v in still], context), self.model.n)
+            return self._exact(x, context)[1]
+        space = self.model.space
+        after = self._advance(space.around(x), [float(v) for v in still], context)
+        return jacobian(space.minus(after, values(after).tolist()), self.model.n)
 
     def disturbance(self, x: Vector, context: Context, carried: Sequence[str]) -> Disturbance:
         """The noises of a step from x (n), some of them carried by sigma points. Raises StepError NOT_FINITE.
@@ -134,12 +142,13 @@ class Process:
         added = Q
         if rest:
             w: Numbers = [0.0] * len(names)
-            for i, variable in zip(rest, variables(np.zeros(len(rest))), strict=True):
+            for i, variable in zip(rest, at_zero(len(rest)), strict=True):
                 w[i] = variable
             if self._continuous and self._integrator == "exact":
-                G = self._exact(x, np.zeros(len(names)), context)[2][:, rest]
+                G = self._exact(x, context)[2][:, rest]
             else:
-                G = jacobian(self._advance([float(v) for v in x], w, context), len(rest))
+                after = self._advance([float(v) for v in x], w, context)
+                G = jacobian(self.model.space.minus(after, values(after).tolist()), len(rest))
             added = added + G @ held[np.ix_(rest, rest)] @ G.T
         if self._white:
             added = added + self._diffusion(x, Qw[np.ix_(self._white, self._white)], context)
@@ -152,7 +161,8 @@ class Process:
         return self._Qw(self.model.environment(context, x))[np.ix_(self._held, self._held)]
 
     def _rate(self, x: Sequence[Number], held: Sequence[Number], white: Sequence[Number], context: Context) -> Numbers:
-        """The formulas of f at (x, noises): dx/dt in continuous form, else the next state."""
+        """The formulas of f at (x, noises): dx/dt, of a quaternion the body's angular rate (k numbers), in continuous
+        form, else the next state (n numbers)."""
         noise = {self._names[i]: number for i, number in zip(self._held, held, strict=True)}
         noise |= {self._names[i]: number for i, number in zip(self._white, white, strict=True)}
         environment = self.model.environment(context, x, noise)
@@ -164,49 +174,70 @@ class Process:
         still = [0.0] * len(self._white)
         if not self._continuous:
             return self._rate(x, w, still, context)
-        step = _INTEGRATORS[self._integrator]
+        step = INTEGRATORS[self._integrator]
         h = context.dt / self._substeps
         for _ in range(self._substeps):
-            x = step(lambda state: self._rate(state, w, still, context), x, h)
+            x = step(lambda state: self._rate(state, w, still, context), x, h, self.model.space)
         return x
 
     def _rate_jacobians(self, x: Vector, context: Context) -> tuple[Vector, Matrix, Matrix, Matrix]:
-        """dx/dt (n), and its Jacobians by x, by the noises per step, by the densities, all noises at 0."""
+        """The rate (n), and its Jacobians by x as the body sees it (n), by the noises per step, by the densities, all
+        noises at 0."""
         n, a, b = self.model.n, len(self._held), len(self._white)
-        joint = variables([*x, *np.zeros(a + b)])
-        rate = self._rate(joint[:n], joint[n : n + a], joint[n + a :], context)
+        joint = at_zero(n + a + b)
+        around = self.model.space.along(x.tolist(), joint[:n])
+        rate = self._rate(around, joint[n : n + a], joint[n + a :], context)
         derivatives = jacobian(rate, n + a + b)
         return values(rate), derivatives[:, :n], derivatives[:, n : n + a], derivatives[:, n + a :]
 
-    def _exact(self, x: Vector, w: Vector, context: Context) -> tuple[Vector, Matrix, Matrix]:
-        """x after the step, F and G of dx/dt = A x + B w + c with w and c held, by one matrix exponential.
+    def _exact(self, x: Vector, context: Context) -> tuple[Vector, Matrix, Matrix]:
+        """x after the step, F and G of dx/dt = A x + B w + c with w = 0 and c held, by one matrix exponential.
 
-        expm([[A, B, c], [0, 0, 0]] dt) = [[F, G, d], [0, I, 0]] (Van Loan 1978, equation 1.2).
+        expm([[A, B, c], [0, 0, 0]] dt) = [[F, G, d], [0, I, 0]] (Van Loan 1978, equation 1.2). Quaternions turn at a
+        constant rate: the error that the body sees then has constant coefficients too.
         """
-        n, a = self.model.n, len(self._held)
+        n, a, space = self.model.n, len(self._held), self.model.space
         rate, A, B, _ = self._rate_jacobians(x, context)
         generator = np.zeros((n + a + 1, n + a + 1))
-        generator[:n] = np.column_stack([A, B, rate - A @ x])
+        generator[:n] = np.column_stack([space.turning(A, rate), B, self._offset(x, A, rate)])
         exponential = expm(_finite(generator * context.dt))
-        F, G, d = exponential[:n, :n], exponential[:n, n : n + a], exponential[:n, -1]
-        return F @ x + G @ w + d, F, G
+        F, G = exponential[:n, :n], exponential[:n, n : n + a]
+        after = self._after(x, exponential, rate * context.dt)
+        end = space.from_body(after)
+        return after, end @ F @ space.from_body(x).T, end @ G
 
     def _advance_exact(self, x: Vector, w: Vector, context: Context) -> Vector:
         """x after the step of dx/dt = A x + b(w) with w held: expm([[A, b], [0, 0]] dt) times (x, 1)."""
-        n, still = self.model.n, [0.0] * len(self._white)
-        rate = self._rate(variables(x), [float(v) for v in w], still, context)
-        A, generator = jacobian(rate, n), np.zeros((n + 1, n + 1))
-        generator[:n] = np.column_stack([A, values(rate) - A @ x])
+        n, space = self.model.n, self.model.space
+        around = space.along(x.tolist(), at_zero(n))
+        rates = self._rate(around, [float(v) for v in w], [0.0] * len(self._white), context)
+        A, rate, generator = jacobian(rates, n), values(rates), np.zeros((n + 1, n + 1))
+        generator[:n] = np.column_stack([space.turning(A, rate), self._offset(x, A, rate)])
         if not np.isfinite(generator).all():
-            return np.full(n, math.nan)
-        after: Vector = (expm(generator * context.dt) @ np.append(x, 1.0))[:n]
-        return after
+            return np.full(self.model.nx, math.nan)
+        return self._after(x, expm(generator * context.dt), rate * context.dt)
+
+    def _offset(self, x: Vector, A: Matrix, rate: Vector) -> Vector:
+        """c (n) of dx/dt = A x + c; 0 for rotations."""
+        flat = self.model.space.flat(x)
+        offset: Vector = np.where(self.model.space.real, rate - A @ flat, 0.0)
+        return offset
+
+    def _after(self, x: Vector, exponential: Matrix, turn: Vector) -> Vector:
+        """x (nx) after an exact step: numbers by the exponential of the generator, quaternions by their turn (n)."""
+        n, space = self.model.n, self.model.space
+        moved: Vector = exponential[:n, :n] @ space.flat(x) + exponential[:n, -1]
+        after = space.along(x.tolist(), turn.tolist())
+        for block in space.blocks:
+            if block.rotation is None:
+                after[block.number] = moved[block.error]
+        return space.normalised(values(after))
 
     def _expand_exact(self, x: Vector, joint: Numbers, context: Context) -> Numbers:
         """The exact step bends only where a held noise enters dx/dt in a nonlinear way: by
         (integral of expm(A s) over the step) times the second derivatives of dx/dt."""
         n, k = self.model.n, len(joint)
-        x_next, F, G = self._exact(x, np.zeros(k - n), context)
+        x_next, F, G = self._exact(x, context)
         A = self._rate_jacobians(x, context)[1]
         generator = np.block([[A, np.eye(n)], [np.zeros((n, 2 * n))]])
         integral = expm(_finite(generator * context.dt))[:n, n:]
@@ -217,51 +248,26 @@ class Process:
 
     def _diffusion(self, x: Vector, Qc: Matrix, context: Context) -> Matrix:
         """What the densities Qc add to the covariance over the step."""
-        n = self.model.n
-        _, A, _, G = self._rate_jacobians(x, context)
+        n, space = self.model.n, self.model.space
+        rate, A, _, G = self._rate_jacobians(x, context)
         spread = G @ Qc @ G.T
         if self._integrator != "exact":
-            added: Matrix = spread * context.dt
+            start = space.from_body(x)
+            added: Matrix = start @ spread @ start.T * context.dt
             return added
         # Van Loan 1978, equations 1.2 and 2.1: expm([[-A, C], [0, A^T]] dt) = [[., F^-1 Q], [0, F^T]]
+        A = space.turning(A, rate)
         generator = np.block([[-A, spread], [np.zeros((n, n)), A.T]])
         exponential = expm(_finite(generator * context.dt))
         integral: Matrix = exponential[n:, n:].T @ exponential[:n, n:]
-        return integral
+        end = space.from_body(values(space.along(x.tolist(), (rate * context.dt).tolist())))
+        return np.asarray(end @ integral @ end.T, dtype=np.float64)
 
 
 def _finite(matrix: Matrix) -> Matrix:
     if not np.isfinite(matrix).all():
         raise StepError(Status.NOT_FINITE)
     return matrix
-
-
-def _along(x: Numbers, h: float, k: Numbers) -> Numbers:
-    return [a + h * b for a, b in zip(x, k, strict=True)]
-
-
-def _euler(f: Derivative, x: Numbers, h: float) -> Numbers:
-    return _along(x, h, f(x))
-
-
-def _midpoint(f: Derivative, x: Numbers, h: float) -> Numbers:
-    return _along(x, h, f(_along(x, 0.5 * h, f(x))))
-
-
-def _rk4(f: Derivative, x: Numbers, h: float) -> Numbers:
-    """The classical Runge-Kutta method (Kutta 1901)."""
-    k1 = f(x)
-    k2 = f(_along(x, 0.5 * h, k1))
-    k3 = f(_along(x, 0.5 * h, k2))
-    k4 = f(_along(x, h, k3))
-    return [a + h / 6.0 * (b + 2.0 * c + 2.0 * d + e) for a, b, c, d, e in zip(x, k1, k2, k3, k4, strict=True)]
-
-
-_INTEGRATORS: dict[str, Callable[[Derivative, Numbers, float], Numbers]] = {
-    "euler": _euler,
-    "midpoint": _midpoint,
-    "rk4": _rk4,
-}
 
 
 def expm(A: Matrix) -> Matrix:

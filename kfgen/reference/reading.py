@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from kfgen.reference.evaluate import renamed
+from kfgen.reference.manifold import Manifold
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.sensors import filter_of
 from kfgen.spec.tree import Expression, names
@@ -71,8 +72,10 @@ def read_by_update(spec: Spec, sensor: str, used: Sequence[int] | None = None) -
 
 def _part(sensor: Sensor, used: Sequence[int]) -> Sensor:
     """The sensor as if it had only some of its components."""
-    R = None if sensor.R is None else tuple(tuple(sensor.R[i][j] for j in used) for i in used)
-    return replace(sensor, components=tuple(sensor.components[i] for i in used), R=R)
+    space = Manifold([component.name for component in sensor.components], sensor.rotations)
+    rows, left = space.rows(used), tuple(b.rotation for b in space.part(used).rotations if b.rotation is not None)
+    R = None if sensor.R is None else tuple(tuple(sensor.R[i][j] for j in rows) for i in rows)
+    return replace(sensor, components=tuple(sensor.components[i] for i in used), R=R, rotations=left)
 
 
 _HIDDEN = {"z": "", "h": ""}
@@ -80,8 +83,16 @@ _HIDDEN = {"z": "", "h": ""}
 
 def _own_noise(sensor: Sensor) -> list[Expression]:
     """The entries of R."""
-    own = [component.variance for component in sensor.components if component.variance is not None]
-    return own if sensor.R is None else [entry for row in sensor.R for entry in row]
+    return list(variances(sensor).values()) if sensor.R is None else [entry for row in sensor.R for entry in row]
+
+
+def variances(sensor: Sensor) -> dict[str, Expression]:
+    """Error -> its variance, where the sensor gives one."""
+    parts = {part for rotation in sensor.rotations for part in rotation.parts}
+    given = {c.name: c.variance for c in sensor.components if c.name not in parts}
+    for rotation in sensor.rotations:
+        given |= dict(zip(rotation.errors, rotation.variances, strict=True))
+    return {name: variance for name, variance in given.items() if variance is not None}
 
 
 def in_use(spec: Spec, noise: Iterable[Noise], formulas: Iterable[Expression]) -> tuple[Noise, ...]:

@@ -31,7 +31,7 @@ class Treatment:
             self.plain,
             chi2=None if options.adaptive is None else _threshold(model, options.adaptive, options.robust is not None),
             limit=math.inf if options.gain_limit is None else model.number(options.gain_limit),
-            consider=tuple(model.index[name] for name in options.consider),
+            consider=tuple(model.row[name] for name in options.consider),
             one_by_one=options.adapt_Q is not None,
         )
         self.trivial = self._influence is None and self._rules == self.plain

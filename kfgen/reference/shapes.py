@@ -32,12 +32,20 @@ class Shape:
 
 CONSTANT = Shape()
 
+Shapes = dict[str, Shape]
+
 
 class Formulas:
-    """Formulas over the states and some noises; every other name is a constant to them."""
+    """Formulas over the states and some noises; every other name is a constant to them.
 
-    def __init__(self, model: Model, noises: Sequence[str]) -> None:
+    turning: whether the attitude counts as one, in the matrices of quaternion states and in what their rates make of
+    them: then a noise that enters as rotate(q, w), or in the rate of q, does so with a constant factor.
+    """
+
+    def __init__(self, model: Model, noises: Sequence[str], turning: bool = True) -> None:
         self.model, self.variables = model, (*model.states, *noises)
+        self.turning = turning
+        self._attitude = frozenset(part for rotation in model.spec.rotations for part in rotation.parts)
         self.definitions = {definition.name: definition.value.tree for definition in model.spec.let}
 
     def point(self) -> dict[str, Shape]:
@@ -52,21 +60,44 @@ class Formulas:
             return self._f(x, {name: x[name] for name in self.model.states})
         if dynamics.integrator == "exact":
             # linear in the states: the step has of the noises what the rate has
-            return _along(x, self._rate(x))
+            return self._along(x, self._rate(x))
         for _ in range(dynamics.substeps):
-            after = x | _INTEGRATORS[dynamics.integrator](self._rate, x)
+            after = x | self._integrated(dynamics.integrator, x)
             if after == x:
                 break
             x = after
         return {name: x[name] for name in self.model.states}
 
     def _rate(self, x: dict[str, Shape]) -> dict[str, Shape]:
-        return self._f(x, dict.fromkeys(self.model.states, CONSTANT))
+        return self._f(x, dict.fromkeys(self.model.errors, CONSTANT))
 
     def _f(self, x: dict[str, Shape], otherwise: Mapping[str, Shape]) -> dict[str, Shape]:
-        """f at x; `otherwise` for states without a formula."""
+        """f at x; `otherwise` for what has no formula."""
         f, known = self.model.spec.dynamics.f, dict(x)
-        return {name: self.shape(f[name].tree, known) if name in f else otherwise[name] for name in self.model.states}
+        return {name: self.shape(f[name].tree, known) if name in f else otherwise[name] for name in otherwise}
+
+    def _integrated(self, integrator: str, x: Shapes) -> Shapes:
+        k = [self._rate(x)]
+        if integrator != "euler":
+            k.append(self._rate(self._along(x, k[0])))
+        if integrator == "rk4":
+            k.append(self._rate(self._along(x, k[1])))
+            k.append(self._rate(self._along(x, k[2])))
+        else:
+            k = k[-1:]
+        for each in k:
+            x = self._along(x, each)
+        return x
+
+    def _along(self, x: Shapes, k: Shapes) -> Shapes:
+        """x + h k, of the states; what is a quaternion's turns with its rate."""
+        after = x | {name: _sum(x[name], slope) for name, slope in k.items() if name in x}
+        for rotation in self.model.spec.rotations if self.turning else ():
+            rate = [k[name] for name in rotation.errors]
+            if any(part.names for part in rate):
+                turned = _bent(*(x[part] for part in rotation.parts), *rate)
+                after |= dict.fromkeys(rotation.parts, turned)
+        return after
 
     def shape(self, tree: Tree, known: dict[str, Shape]) -> Shape:
         """The shape of a formula; `known` are the shapes of names, to which those of definitions are added."""
@@ -77,7 +108,8 @@ class Formulas:
         if not isinstance(tree, Call):
             return CONSTANT
         parts = [self.shape(argument, known) for argument in tree.args]
-        if not any(part.names for part in parts):
+        contained = frozenset().union(*(part.names for part in parts))
+        if not contained or (tree.op == "rotation" and not self.turning and contained <= self._attitude):
             return CONSTANT
         if tree.op == "mul" and any(self._is(argument, 0) for argument in tree.args):
             return CONSTANT
@@ -147,33 +179,6 @@ def _table(x: Shape, *points: Shape) -> Shape:
 
 _RULES: dict[str, Callable[..., Shape]] = {
     "add": _sum, "sub": _sum, "neg": _sum, "mul": _product, "div": _quotient, "where": _selected, "table": _table,
-    "atan": _turning, "atan2": _turning, "sign": _flat, "floor": _flat, "lt": _flat, "le": _flat, "gt": _flat,
-    "ge": _flat, "and": _flat, "or": _flat, "not": _flat,
+    "rotation_vector": _turning, "atan": _turning, "atan2": _turning, "sign": _flat, "floor": _flat, "lt": _flat,
+    "le": _flat, "gt": _flat, "ge": _flat, "and": _flat, "or": _flat, "not": _flat,
 }  # fmt: skip
-
-
-Shapes = dict[str, Shape]
-
-
-def _along(x: Shapes, k: Shapes) -> Shapes:
-    """x + h k, of the states."""
-    return x | {name: _sum(x[name], slope) for name, slope in k.items()}
-
-
-def _euler(f: Callable[[Shapes], Shapes], x: Shapes) -> Shapes:
-    return _along(x, f(x))
-
-
-def _midpoint(f: Callable[[Shapes], Shapes], x: Shapes) -> Shapes:
-    return _along(x, f(_along(x, f(x))))
-
-
-def _rk4(f: Callable[[Shapes], Shapes], x: Shapes) -> Shapes:
-    k1 = f(x)
-    k2 = f(_along(x, k1))
-    k3 = f(_along(x, k2))
-    k4 = f(_along(x, k3))
-    return _along(_along(_along(_along(x, k1), k2), k3), k4)
-
-
-_INTEGRATORS = {"euler": _euler, "midpoint": _midpoint, "rk4": _rk4}

@@ -6,7 +6,7 @@ unscented transform's encyclopaedia article (wiki), Arasaratnam & Haykin 2009 (c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,8 +49,8 @@ class PointSet:
 
 @dataclass(frozen=True)
 class Images:
-    """What points became in k coordinates: base (k) the image of the point at the mean; e (N, k): their differences
-    from it; d (k): the mean of these."""
+    """What points became: base the image of the point at the mean; e (N, k): their differences from it, k the number of
+    its errors; d (k): the mean of these."""
 
     weights: PointSet
     base: Vector
@@ -58,13 +58,13 @@ class Images:
     d: Vector
 
     @property
-    def mean(self) -> Vector:
-        return self.base + self.d
-
-    @property
     def deviations(self) -> Matrix:
         """From the mean (N, k)."""
         return self.e - self.d
+
+    def moved(self, T: Matrix) -> Images:
+        """As seen from elsewhere: T (k, k) takes differences there."""
+        return replace(self, e=self.e @ T.T, d=T @ self.d)
 
     def covariance(self, other: Images) -> Matrix:
         """Their covariance (k, l) with those of the same points elsewhere: sum wc dX dY^T.

@@ -64,27 +64,31 @@ class Ukf(Algorithm):
         noise = self.process.disturbance(x, context, self._carried)
         cloud = self.drawing.draw(x, estimate.P, noise.carried)
         images, flags = self._images(cloud, context)
+        space = self.model.space
+        mean = space.moved(images.base, images.d)
+        images = images.moved(space.turned(images.d))
         P = symmetric(images.covariance(images)) + noise.added
-        if not (np.isfinite(images.mean).all() and np.isfinite(P).all()):
+        if not (np.isfinite(mean).all() and np.isfinite(P).all()):
             raise StepError(Status.NOT_FINITE)
         noise.judge()
         if cloud.weights.negative:
             judge(P, images.size + noise.added.diagonal())
             P = bounded(P, np.zeros(self.model.n))
         P, gone = self._as_root(P, images, noise.added)
-        mean, P, more = self.limits.finish(images.mean, P, context)
+        stored, P, more = self.limits.finish(mean, P, context)
         kept = None
         if self.keeps and not more:  # points that a floor or ceiling contradicts are none of this estimate
-            # angles of points near the mean that is stored, which was wrapped
-            turn = np.array([mean[i] - images.mean[i] if i in self.model.periods else 0.0 for i in range(len(mean))])
-            kept = Cloud(images.base + images.e + turn, np.zeros((len(images.e), 0)), images)
-        return replace(estimate, x=mean, P=P, memory=kept), flags | gone | more
+            # what is kept are deviations, as seen from the mean: numbers lie where f left them, rotations where these
+            # lead from the mean; angles near the mean that is stored, which was wrapped
+            turn = np.array([stored[i] - mean[i] if i in self.model.periods else 0.0 for i in range(len(mean))])
+            points = np.array([space.moved(mean, deviation) for deviation in images.deviations])
+            kept = Cloud(points + turn, np.zeros((len(images.e), 0)), images)
+        return replace(estimate, x=stored, P=P, memory=kept), flags | gone | more
 
     def _images(self, cloud: Cloud, context: Context) -> tuple[Images, Status]:
         """f at the points, within the bounds; those that are rejected replaced by f at the centre.
 
-        A set without a point at the mean has f evaluated there beside, if something is to be wrapped. Raises
-        NOT_FINITE.
+        A set without a point at the mean has f evaluated there beside, if something turns. Raises NOT_FINITE.
         """
         raw, model = [], self.model
         for point, values in zip(cloud.points, cloud.noise, strict=True):
@@ -93,7 +97,7 @@ class Ukf(Algorithm):
             raw.append(self.process.advance(point, w, context))
         flags, middle = Status.OK, cloud.weights.centre
         base = raw[middle or 0]
-        if middle is None and self._wrapped:
+        if middle is None and (self._wrapped or model.space.rotations):
             base = self.process.advance(model.clip(cloud.states.base), np.zeros(self._held), context)
         if self._rejects:
             for i, image in enumerate(raw):
@@ -102,13 +106,13 @@ class Ukf(Algorithm):
         if not (np.isfinite(raw).all() and np.isfinite(base).all()):
             raise StepError(Status.NOT_FINITE)
         base = model.clip(base)
-        e = np.array([model.clip(image) for image in raw]) - base
+        e = np.array([model.space.difference(model.clip(image), base) for image in raw])
         for i in self._wrapped:
-            e[:, i] = [wrap(float(difference), model.periods[i]) for difference in e[:, i]]
+            e[:, i] = [wrap(float(difference), model.turns[i]) for difference in e[:, i]]
         return Images(cloud.weights, base, e, cloud.weights.wm @ e), flags
 
     def _rejected(self, image: Vector, context: Context) -> bool:
-        """Whether the spec rejects the image (n) of a point, as f left it; t is that of the step's start."""
+        """Whether the spec rejects the image (nx) of a point, as f left it; t is that of the step's start."""
         if not np.isfinite(image).all():
             return True
         return self._reject is not None and bool(self._reject(self.model.environment(context, image)))
@@ -143,13 +147,13 @@ class Ukf(Algorithm):
         return Innovation(measured.nis, measured)
 
     def correct(self, estimate: Estimate, reading: Reading, innovation: Innovation) -> Correction:
-        """x <- x + K y, P <- P - K S K^T; then R where it adapts."""
+        """x <- x [+] K y, P <- P - K S K^T, as seen from there; then R where it adapts."""
         detail = innovation.detail
         if isinstance(detail, Scalars):
             return self._correct_scalars(estimate, reading, detail)
         assert isinstance(detail, Measured)
         flags, measured = Status.OK, detail
-        inflation = self._inflation(measured, len(reading.used))
+        inflation = self._inflation(measured, len(reading.rows))
         if inflation > 0.0:
             estimate = replace(estimate, P=(1.0 + inflation) * estimate.P, memory=None)
             cloud = self.measuring.draw(estimate.x, estimate.P, reading)
@@ -191,7 +195,7 @@ class Ukf(Algorithm):
                 gone = gone or zero
             if gone:
                 P, flags = S @ S.T, flags | Status.REGULARIZED
-        x, P, more = self.limits.finish(estimate.x + K @ measured.y, P, context)
+        x, P, more = self.limits.corrected(estimate.x, P, K @ measured.y, context)
         D = measured.S.D[measured.S.D > 0.0]
         log_det = float(np.sum(np.log(2.0 * math.pi * D)))
         terms = float(np.sum(measured.S.squares(measured.y)))
@@ -204,7 +208,7 @@ class Ukf(Algorithm):
         if not self.treatment.trivial:
             rules = self.treatment.rules(reading.context)
             result = update(estimate.P, scalars.H, scalars.R, scalars.y, rules)
-        x, P, flags = self.limits.finish(estimate.x + result.dx, result.P, reading.context)
+        x, P, flags = self.limits.corrected(estimate.x, result.P, result.dx, reading.context)
         stored = self._adapted(replace(estimate, x=x, P=P, memory=None), reading, scalars.noise)
         return Correction(stored, result.log_likelihood, flags | result.flags)
 

@@ -14,8 +14,8 @@ from fractions import Fraction
 import mpmath
 
 from kfgen.spec.constants import NotConstant, keep, value
+from kfgen.spec.contexts import Context
 from kfgen.spec.operations import DIGITS, NoValue, Value, real
-from kfgen.spec.scopes import Context
 from kfgen.spec.tree import Call, Name, Tree
 
 
@@ -66,9 +66,10 @@ class Affine:
 
     def _by_values(self, tree: Tree, known: Mapping[str, Value]) -> bool:
         draw = random.Random(1)  # the same points on every run
+        inputs = {given.name for sensor in self.context.sensors for given in sensor.inputs}
         others = {
             name: Fraction(draw.randint(10, 990), 1000)
-            for name in sorted(self.context.kinds.keys() | {"dt", "t"})
+            for name in sorted(self.context.kinds.keys() | inputs | {"dt", "t"})
             if name not in self.variables and name not in known and name not in self.definitions
         }
         names = sorted(self.variables)

@@ -54,7 +54,7 @@ def wanted_words(shape: Shape) -> str:
     if isinstance(shape, Budget):
         return "a number of bytes"
     if isinstance(shape, Reference):
-        return f"the name of a {shape.of}"
+        return f"the name of a {shape.words}"
     if isinstance(shape, Items):
         return f"a list of {shape.what}"
     if isinstance(shape, Tuple):
@@ -62,5 +62,5 @@ def wanted_words(shape: Shape) -> str:
     if isinstance(shape, Record):
         return "a mapping"
     if isinstance(shape, Table):
-        return f"a mapping ({shape.of}: value)"
+        return f"a mapping ({shape.words}: value)"
     return " or ".join(wanted_words(s) for s in (shape.scalar, shape.mapping, shape.sequence) if s)

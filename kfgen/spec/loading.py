@@ -13,6 +13,7 @@ from kfgen.spec.builders import Builder
 from kfgen.spec.names import check_identifiers
 from kfgen.spec.nodes import Mapping, kind_of
 from kfgen.spec.problems import Problems, short
+from kfgen.spec.raw import BAD
 from kfgen.spec.reader import MAX_BYTES, read
 from kfgen.spec.rules import check
 from kfgen.spec.schema import TOP
@@ -67,9 +68,19 @@ def _loads(content: str, file: str, sha256: str) -> Spec:
     top = walker.record(root, TOP, ())
     spec = Builder(walker, top).build(file, sha256)
     check(walker, spec)
+    if not problems.mistakes:
+        _unshaped(walker)
     if problems.mistakes:
         raise problems.error()
     return spec
+
+
+def _unshaped(walker: Walker) -> None:
+    """A formula whose shape follows from itself is a mistake that nothing else has found."""
+    for written in walker.formulas:
+        if any(part.tree == BAD for part in written.parts):
+            hint = "definitions that are vectors must not use each other in a circle"
+            walker.problems.add(written.expression.place, "the shape of this formula cannot be told", hint)
 
 
 def with_scalar(spec: Spec, scalar: str) -> Spec:

@@ -54,13 +54,16 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
     """Every identifier that the emitted code declares: (identifier, what it is, where it comes from)."""
     lower, upper = spec.name, spec.name.upper()
     own = spec.place
-    for word in ("NX", *(("NU",) if spec.inputs else ()), *(("NB",) if spec.imm else ())):
+    sizes = {"NX": True, "NE": bool(spec.rotations), "NU": bool(spec.inputs), "NB": spec.imm is not None}
+    for word in (word for word, there in sizes.items() if there):
         yield f"{upper}_{word}", "a size", own
     for word in STATUS:
         yield f"{upper}_{word}", "a status", own
     yield f"{upper}_H_INCLUDED", "the header guard", own
     functions = ["init", "predict", "set_state", "set_covariance", "get_covariance"]
     types = ["t", "real_t", "status_t"] + ["inputs_t"] * bool(spec.inputs) + ["parameters_t"] * bool(spec.parameters)
+    types += ["outputs_t"] * bool(spec.outputs)
+    functions += ["get_outputs"] * bool(spec.outputs)
     filters = [m.filter for m in spec.imm.modes] if spec.imm else [spec.filter]
     if any(f.covariance == "sqrt" for f in filters):
         functions += ["set_sqrt_covariance", "get_sqrt_covariance"]
@@ -74,6 +77,8 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
         yield f"{lower}_{word}", "a function", own
     for state in spec.states:
         yield f"{upper}_{state.name.upper()}", f"the index of the state `{state.name}`", state.place
+    for error in spec.errors if spec.rotations else ():
+        yield f"{upper}_ERROR_{error.upper()}", f"the index of the error coordinate `{error}`", own
     for sensor in spec.measurements:
         yield f"{upper}_NZ_{sensor.name.upper()}", f"the size of the sensor `{sensor.name}`", sensor.place
         yield f"{lower}_{sensor.name}_t", f"the type of the sensor `{sensor.name}`", sensor.place
@@ -97,10 +102,11 @@ def _scaled(spec: Spec, upper: str) -> Iterator[tuple[str, str, Place]]:
     values += [(i.name, f"the input `{i.name}`", spec.place) for i in spec.inputs]
     values += [(p.name, f"the parameter `{p.name}`", spec.place) for p in spec.parameters]
     values += [
-        (f"{s.name}_{c.name}", f"the component `{s.name}.{c.name}`", c.place)
+        (f"{s.name}_{c.name}", f"the {'component' if c in s.components else 'input'} `{s.name}.{c.name}`", c.place)
         for s in spec.measurements
-        for c in s.components
+        for c in s.fields
     ]
+    values += [(o.name, f"the output `{o.name}`", o.place) for o in spec.outputs]
     if spec.dt is not None and spec.dt.run_time:
         values.append(("dt", "dt", spec.place))
     for name, what, place in values:

@@ -28,9 +28,21 @@ class Word:
 class Written:
     """A formula as it stands in the file: what may stand in it, and under which keys it is."""
 
-    expression: Expression
+    expression: Expression  # as it was parsed; of a vector or a list every entry
     scope: str
     path: Path
+    parts: tuple[Expression, ...] = ()  # of numbers, once the shapes are known
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A list of YAML where a formula stands: a vector, or the rows of a matrix."""
+
+    items: tuple[Expression | Listed, ...]
+    place: Place
+
+
+Formulas = Expression | Listed
 
 
 @dataclass
@@ -72,6 +84,11 @@ def matrix(written: Any) -> Matrix | None:
     if not isinstance(written, tuple) or any(row is None for row in written):
         return None
     return written
+
+
+def key_of(path: str) -> str:
+    """The last key of a path, of an entry of a list the list's."""
+    return path.rpartition(".")[2].partition("[")[0]
 
 
 def path_text(path: Path) -> str:

@@ -67,6 +67,8 @@ def _cure(what: str) -> str:
         return "check the indentation"
     if "mapping values are not allowed" in what:
         return "check the indentation, or quote text that holds a colon"
+    if "got '['" in what:
+        return "quote an expression with brackets, such as \"v[0]\": to YAML they begin a list"
     if "flow" in what:
         return "check that brackets and braces are closed"
     return ""

@@ -24,7 +24,9 @@ from kfgen.spec.shapes import (
     Tuple,
     Whole,
 )
+from kfgen.spec.shaping.expand import MAX_EXPANDED
 from kfgen.spec.tree import FUNCTIONS
+from kfgen.spec.vector_guide import vectors
 
 _TITLES = {
     "spec": ("The spec", "The top of the file."),
@@ -32,7 +34,8 @@ _TITLES = {
     "dt": ("dt", "As a mapping, dt is an argument of predict. As a number it is compiled in."),
     "state": ("states.<name>", "Exactly one of `std` and `var`, unless `P0` is given."),
     "initialize": ("initialize", ""),
-    "input": ("inputs.<name>", ""),
+    "input": ("inputs.<name>", "Also `measurements.<name>.inputs.<name>`."),
+    "output": ("outputs.<name>", "A vector is told by its parts."),
     "noise": (
         "noise.<name>",
         "Exactly one of `std`, `var`, `density`, `root_density`, unless `noise_covariance` is given.",
@@ -105,6 +108,11 @@ DECISIONS = (
     "An imm has 2 to 8 modes; mu0 defaults to equal probabilities. A mode's `states` lists every state. "
     "A mode's `states` replaces an inherited P0, a mode's `P0` replaces inherited variances and "
     "covariances. kind and partial of a sensor are the same in all modes.",
+    "The parts of a matrix M are `M_1_1`, `M_1_2`, ... An index is a whole number. A list has at most 100 entries; a "
+    f"part of an expression, written out, at most {MAX_EXPANDED} nodes. A name has one shape in all modes.",
+    "In `covariances` two vectors take a matrix, or, of equal size, a number or a vector for equal parts. A residual "
+    "of a vector works part by part. `gate`, `rate` and limits of a filter are numbers.",
+    "Each sensor stands once in `initialize`, and each state is set by one of them. A quaternion is set whole.",
     "A constant must fit the scalar (float: below 3.4e38). A number is at most 1.7e308 and, if not 0, "
     "at least 1e-308.",
     "Long sums and products (more than 24 operands) are evaluated as balanced trees.",
@@ -115,7 +123,7 @@ DECISIONS = (
 
 def markdown() -> str:
     """The complete reference, as Markdown."""
-    parts = [_INTRODUCTION.strip(), _expressions(), _names(), _scopes(), "## Keys"]
+    parts = [_INTRODUCTION.strip(), _expressions(), _names(), vectors(), _scopes(), "## Keys"]
     seen: list[Record] = []
     for record in RECORDS:
         _sections(record, parts, seen)
@@ -160,7 +168,7 @@ def _names() -> str:
     return f"""## Names
 
 Constants, parameters, states, inputs, noises and definitions share one name space with `dt` (the step in
-s) and `t` (seconds since init). Sensors, their components and modes have their own. A name is a C
+s) and `t` (seconds since init). Sensors, their components and inputs, outputs and modes have their own. A name is a C
 identifier of at most {MAX_NAME} characters without a leading underscore; it is no keyword of C, C++ or
 Python, no function of the language, not `pi`, `e`, `t` or `dt` (what stands in no expression may be called
 so: sensors, components, the filter), and no macro of C's headers or of Arduino. `name` is no standard
@@ -238,6 +246,8 @@ def _words(shape: Shape) -> str:
         return " \\| ".join(f"`{value}`" for value in shape.values)
     if isinstance(shape, Flag):
         return "`true` \\| `false`"
+    if isinstance(shape, Formula) and shape.shaped:
+        return f"expression or list ({shape.scope})"
     if isinstance(shape, Formula):
         words = " \\| ".join(f"`{word}`" for word in shape.words)
         kind = "condition" if shape.condition else "expression"
@@ -247,15 +257,16 @@ def _words(shape: Shape) -> str:
     if isinstance(shape, Budget):
         return "bytes, or with k: `16k`"
     if isinstance(shape, Reference):
-        return shape.of
+        return shape.words
     if isinstance(shape, Items):
-        if isinstance(shape.item, Items) and isinstance(shape.item.item, Formula):
-            return f"matrix, a list of rows ({shape.item.item.scope})"
+        rows = shape.item.sequence if isinstance(shape.item, Either) else shape.item
+        if isinstance(rows, Items) and isinstance(rows.item, Formula):
+            return f"matrix, a list of rows ({rows.item.scope})"
         return f"list of {shape.what}"
     if isinstance(shape, Tuple):
         return shape.what
     if isinstance(shape, Table):
-        return f"{shape.of}: {_words(shape.value)}"
+        return f"{shape.words}: {_words(shape.value)}"
     if isinstance(shape, Record):
         return "mapping" if shape.bare is None else "number \\| mapping"
     parts = [_words(s) for s in (shape.scalar, shape.mapping, shape.sequence) if s is not None]

@@ -14,6 +14,7 @@ from kfgen.native.run import plan
 from kfgen.reference import reference
 from kfgen.simulate import simulate
 from kfgen.spec import loads
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status
 from tests.campaign.generate import text_of
@@ -38,17 +39,15 @@ def calls(spec: Spec, seed: int) -> Iterator[tuple[str | None, dict[str, Any]]]:
         u = {"u": work.u[row]} if spec.inputs else {}
         if work.step[row]:
             yield None, {**u, **({"dt": float(work.dt[row])} if run_time else {})}
-        first = 0
-        for i, sensor in enumerate(spec.measurements):
+        for i, (sensor, place) in enumerate(readings_of(spec)):
             m = len(sensor.components)
-            z = work.z[row, first : first + m].copy()
-            first += m
+            z, inputs = np.split(work.z[row, place].copy(), [m])
             if not work.mask[row, i]:
                 continue
             if dice.random() < 0.1 and spec.scalar == "double":
                 z[dice.randrange(m)] += dice.choice((-1, 1)) * dice.choice((1, 5, 30))
             mask = {"mask": dice.randrange(1, 1 << m)} if sensor.partial and dice.random() < 0.3 else {}
-            yield sensor.name, {"z": z, **u, **mask}
+            yield sensor.name, {"z": z, **u, **mask, **({"inputs": inputs} if sensor.inputs else {})}
 
 
 def _made(kf: Any, sensor: str | None, arguments: dict[str, Any]) -> int:

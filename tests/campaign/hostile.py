@@ -156,13 +156,14 @@ def _updates(generated: Generated, data: Data, unit: Any) -> Sequence[Data]:
         if sensor not in data["measurements"]:
             sensor = sensor.removesuffix("_masked")
         z = data["measurements"][sensor]["z"]
+        own = data["measurements"][sensor].get("inputs", {})  # their fields stand behind those of z
         made.append(
             {
                 "function": function,
                 "sensor": sensor,
                 "first": next(iter(z)),
                 "below": 18 + 48 * (k + 1) // len(functions),
-                "scale": [plausible.size(c, 3.0) / unit(f"{sensor}_{name}") for name, c in z.items()],
+                "scale": [plausible.size(c, 3.0) / unit(f"{sensor}_{name}") for name, c in {**z, **own}.items()],
                 "full": (1 << len(z)) - 1,
                 "masked": generated.declarations.takes(function, "mask"),
                 "u": generated.declarations.takes(function, "u"),

@@ -182,8 +182,11 @@ class Draw:
         sensor: Data = {"z": {}}
         full = m > 1 and self.chance(0.3)
         noise = f"e_{name}" if not self.fixed and self.chance(0.2) else ""
+        own = f"k_{name}" if self.chance(0.2) else ""
+        if own:
+            sensor["inputs"] = {own: {"range": [-2, 2]}}
         for k in range(m):
-            sensor["z"][f"z{k}"] = self.component(full, noise, let)
+            sensor["z"][f"z{k}"] = self.component(full, noise, let, own)
         if full:
             A = [[self.dice.randrange(-3, 4) / 8 for _ in range(m)] for _ in range(m)]
             R = [
@@ -202,7 +205,7 @@ class Draw:
             sensor["partial"] = True
         return sensor
 
-    def component(self, full: bool, noise: str, let: bool) -> Data:
+    def component(self, full: bool, noise: str, let: bool, own: str) -> Data:
         i = self.dice.randrange(self.n)
         if self.kinds[i] and self.chance(0.6):
             component: Data = {"h": self.states[i], "kind": self.kinds[i]}
@@ -214,6 +217,8 @@ class Draw:
                 h.append(f"0.2*{self.curve()}")
             if let and self.chance(0.2):
                 h.append("0.3*l0")
+            if own and self.chance(0.7):
+                h.append(f"0.3*{own}" if self.linear or self.chance(0.5) else f"0.2*{own}*{self.unitless(i)}")
             component = {"h": " + ".join(h)}
         if noise and self.chance(0.7):
             component["h"] += f" + {noise}" if self.linear or self.chance(0.5) else f" + 0.5*{noise}*{self.unitless(i)}"

@@ -20,9 +20,10 @@ SCALARS = ("double", "float", "q16.16", "q20.12")
 
 @cache
 def examples() -> tuple[Data, ...]:
-    """The specs in specs/, as plain data."""
+    """The specs in specs/, as plain data; those of numbers alone, for calls are drawn by the keys of the data."""
     yaml = YAML(typ="safe", pure=True)
-    return tuple(yaml.load(path.read_text()) for path in sorted(SPECS.glob("*.yaml")))
+    texts = [path.read_text() for path in sorted(SPECS.glob("*.yaml"))]
+    return tuple(yaml.load(text) for text in texts if "vector:" not in text and "quaternion" not in text)
 
 
 def mutant(seed: int) -> Data:

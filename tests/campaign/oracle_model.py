@@ -50,6 +50,8 @@ class Model:
         self.noises: dict[str, Any] = data.get("noise", {})
         if any(key in data for key in ("noise_covariance", "initialize")):
             raise UnfollowedError("noise_covariance, initialize")
+        if any("inputs" in sensor for sensor in data["measurements"].values()):
+            raise UnfollowedError("inputs of sensors")
         self.dense = any("density" in w or "root_density" in w for w in self.noises.values())
         self.sensor_noises = any("noise" in s for s in data["measurements"].values())
         self.parameters = {

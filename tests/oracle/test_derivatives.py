@@ -10,7 +10,8 @@ import pytest
 
 from kfgen.reference.dual import Dual, jacobian, values, variables
 from kfgen.reference.evaluate import Closure, Scope
-from kfgen.reference.process import _INTEGRATORS
+from kfgen.reference.integrators import INTEGRATORS
+from kfgen.reference.manifold import Manifold
 from kfgen.spec.expressions import parse
 
 NAMES = ("x", "y")
@@ -211,7 +212,7 @@ def test_integrators_are_differentiated_exactly(integrator):
             environment = [*x, u]
             return [q_dot(environment), w_dot(environment)]
 
-        return _INTEGRATORS[integrator](f, [q, w], h)
+        return INTEGRATORS[integrator](f, [q, w], h, Manifold(["q", "w"], []))
 
     def mp_step(q, w, u):
         def f(a, b):

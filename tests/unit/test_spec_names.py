@@ -11,6 +11,8 @@ from kfgen.spec.names import identifiers, wrong_name
 from kfgen.spec.reference import markdown
 from kfgen.spec.reserved import reserved
 from kfgen.spec.schema import RECORDS
+from kfgen.spec.tree import VECTOR_FUNCTIONS
+from kfgen.spec.vector_guide import EXAMPLE
 
 BASE = "kfgen: 1\nname: car\nscalar: q16.16\nstates: {x: {init: 0, std: 1}}\ndynamics: {}\n"
 BASE += (
@@ -87,3 +89,10 @@ def test_the_reference_names_every_key() -> None:
     assert all(f"| `{key.name}` |" in page for record in RECORDS for key in record.keys)
     assert page == markdown()
     assert "None" not in page
+    assert all(f"`{name}(" in page for name in VECTOR_FUNCTIONS)
+
+
+def test_the_example_of_the_reference_builds() -> None:
+    spec = loads(EXAMPLE)
+    assert spec.errors[6:9] == ("q_rx", "q_ry", "q_rz")
+    assert [start.sensor for start in spec.initialize] == ["still", "gnss"]

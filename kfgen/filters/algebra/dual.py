@@ -5,52 +5,16 @@ Definitions (`let`), the stages of an integrator and substeps are thereby never 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from kfgen.filters.algebra.numbers import is_zero
+from kfgen.filters.algebra.attitude import Attitude
+from kfgen.filters.algebra.gradient import Dual, Gradient, Hessian, nonzero
 from kfgen.ir.lower import Lowering
-from kfgen.ir.trace import Number, Trace, Value
+from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 
-Key = TypeVar("Key")
-Gradient = dict[str, Value]  # variable name -> derivative; what is not there is 0
-Hessian = dict[tuple[str, str], Value]  # pair of variables in alphabetical order -> second derivative
-
-
-@dataclass(frozen=True)
-class Dual:
-    """A value and its derivatives by the variables of the moment (states, noises); second ones where asked for."""
-
-    value: Value
-    gradient: Gradient = field(default_factory=dict)
-    hessian: Hessian = field(default_factory=dict)
-
-    def __add__(self, other: Dual) -> Dual:
-        return Dual(
-            self.value + other.value, _sum(self.gradient, other.gradient), _sum(self.hessian, other.hessian)
-        )
-
-    def scaled(self, factor: Value | Number) -> Dual:
-        """The product with a number that depends on no variable."""
-        return Dual(self.value * factor, _scaled(self.gradient, factor), _scaled(self.hessian, factor))
-
-
-def _sum(a: dict[Key, Value], b: dict[Key, Value]) -> dict[Key, Value]:
-    out = dict(a)
-    for key, value in b.items():
-        out[key] = out[key] + value if key in out else value
-    return _nonzero(out)
-
-
-def _scaled(a: dict[Key, Value], factor: Value | Number) -> dict[Key, Value]:
-    return _nonzero({key: value * factor for key, value in a.items()})
-
-
-def _nonzero(values: dict[Key, Value]) -> dict[Key, Value]:
-    return {key: value for key, value in values.items() if not is_zero(value)}
-
+__all__ = ["Attitude", "Dual", "Evaluator", "attitudes", "held_attitudes", "seeds", "state_seeds", "state_values"]
 
 class Evaluator:
     """Evaluates expressions of a model at given duals; definitions are evaluated when first needed.
@@ -67,6 +31,7 @@ class Evaluator:
         for name, dual in given.items():
             self._bind(name, dual)
         self._definitions = dict(model.definitions)
+        self.attitudes = attitudes(trace, model, self.duals)
 
     def _bind(self, name: str, dual: Dual) -> None:
         self.duals[name] = dual
@@ -77,10 +42,20 @@ class Evaluator:
     def _prepare(self, expression: Any) -> None:
         for symbol in sorted(expression.free_symbols, key=lambda s: s.name):
             if symbol.name not in self.duals and symbol.name in self._definitions:
+                turned = self.model.turned.get(symbol.name)
+                if turned is not None and turned.rotation in self.attitudes and self.order == 1:
+                    self._bind(symbol.name, self._turned(turned, self.attitudes[turned.rotation]))
+                    continue
                 definition = self._definitions[symbol.name]
                 dual = self(definition)
-                self.trace.name(dual.value, symbol.name)
+                self.trace.name(dual.value, symbol.name.replace(".", "_"))
                 self._bind(symbol.name, dual)
+
+    def _turned(self, what: Any, attitude: Attitude) -> Dual:
+        """An entry of R(q), or of what it turns."""
+        if what.vector is None:
+            return attitude.entry(what.i, what.j)
+        return attitude.turned([self(e) for e in what.vector], what.i, what.transposed)
 
     def bind(self, symbol: Any, value: Value) -> None:
         """Give a symbol outside of the model (z, h of a residual) a value."""
@@ -104,7 +79,7 @@ class Evaluator:
                 term = factor * g
                 gradient[name] = gradient[name] + term if name in gradient else term
         hessian = self._hessian(expression) if self.order > 1 else {}
-        return Dual(value, _nonzero(gradient), hessian)
+        return Dual(value, nonzero(gradient), hessian)
 
     def _hessian(self, expression: Any) -> Hessian:
         """Chain rule: sum of df/ds s'' over the symbols, and of d2f/ds dr s' r' over pairs of them."""
@@ -125,9 +100,45 @@ class Evaluator:
                     for b, gb in self.duals[other.name].gradient.items():
                         if a <= b:
                             add((a, b), factor * (ga * gb))
-        return _nonzero(out)
+        return nonzero(out)
 
 
 def seeds(trace: Trace, values: Mapping[str, Value]) -> dict[str, Dual]:
     """Duals of independent variables."""
     return {name: Dual(value, {name: trace.one}) for name, value in values.items()}
+
+
+def state_seeds(t: Trace, model: Model, x: Sequence[Value]) -> dict[str, Dual]:
+    """Duals of the states (in the spec's order), by their errors."""
+    out = {name: Dual(value, {name: t.one}) for name, value in zip(model.states, x, strict=True)}
+    for r in model.rotations:
+        attitude = Attitude(t, r.name, r.geometry, x[r.first : r.first + 4], [{e: t.one} for e in r.errors])
+        out.update(zip(r.parts, attitude.numbers(), strict=True))
+    return out
+
+
+def held_attitudes(t: Trace, model: Model) -> dict[str, Dual]:
+    """The quaternions as constants of a step."""
+    out: dict[str, Dual] = {}
+    for r in model.rotations:
+        q = [t.field(f"attitude.{part}") for part in r.parts]
+        out.update(zip(r.parts, Attitude(t, r.name, r.geometry, q, [{}, {}, {}], held=True).numbers(), strict=True))
+    return out
+
+
+def state_values(model: Model, x: Sequence[Value]) -> dict[str, Dual]:
+    """The states without derivatives."""
+    return {name: Dual(value) for name, value in zip(model.states, x, strict=True)}
+
+
+def attitudes(t: Trace, model: Model, duals: Mapping[str, Dual]) -> dict[str, Attitude]:
+    """The quaternions whose four numbers are given: as rotations, or without derivatives."""
+    found = {}
+    for r in model.rotations:
+        numbers = [duals[part] for part in r.parts if part in duals]
+        if len(numbers) == 4:
+            if numbers[0].attitude is not None:
+                found[r.name] = numbers[0].attitude
+            elif not any(d.gradient for d in numbers):
+                found[r.name] = Attitude(t, r.name, r.geometry, [d.value for d in numbers], [{}, {}, {}])
+    return found

@@ -5,6 +5,8 @@ Of U only the entries above the diagonal are looked at. Exact in real arithmetic
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from kfgen.filters.algebra.linalg import Rows, Vector, dot, times
 from kfgen.filters.algebra.numbers import (
     Number,
@@ -27,17 +29,50 @@ def unit_columns(F: Rows, U: Rows, k: int) -> Vector:
     return out
 
 
-def rank_one(U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]], safe: bool = False) -> None:
+def neighbours(T: Rows) -> list[list[int]] | None:
+    """The blocks of neighbouring states outside of which T is the identity; None: they are no neighbours."""
+    blocks: list[list[int]] = []
+    for i, row in enumerate(T):
+        block = [j for j, v in enumerate(row) if j == i or not is_zero(v)]
+        if block == [i] and is_one(row[i]):
+            continue
+        if block != list(range(block[0], block[-1] + 1)):
+            return None
+        if block not in blocks:
+            blocks.append(block)
+    return blocks
+
+
+def turned_block(U: Rows, D: Vector, T: Rows, block: Sequence[int]) -> None:
+    """U D U^T <- T U D U^T T^T in place, T regular in a block of neighbouring states, the identity elsewhere: columns
+    after the block are turned, those of the block take its pivots, of which as many as columns leave nothing."""
+    n, first = len(D), block[0]
+    for k in range(block[-1] + 1, n):
+        above = [U[j][k] for j in block]
+        for i in block:
+            U[i][k] = dot([T[i][j] for j in block], above)
+    columns = [(unit_columns(T, U, k), D[k], k) for k in block]
+    for k in block:
+        D[k] = 0
+        for i in range(k):
+            U[i][k] = 0
+    rank_one(U, D, columns, lowest=first, highest=block[-1])
+
+
+def rank_one(
+    U: Rows, D: Vector, columns: list[tuple[Vector, Number, int]], safe: bool = False, lowest: int = 0,
+    highest: int | None = None,
+) -> None:  # fmt: skip
     """U D U^T += sum of d w w^T over the columns (w, d, own), in place (Agee & Turner 1972; Bierman 1977, V.3).
 
     The columns take one pivot after another together, so that an element of U is fetched once for all of
     them. `own` is the pivot where a column carries most weight (-1: none): there U <- t U + b w is used for
     U + b (w - s U), which loses digits where D is far below d s^2; so it is where D may be as good as zero, and
-    everywhere if `safe`.
+    everywhere if `safe`. lowest, highest: the pivots that they reach.
     """
     W = [list(w) for w, _, _ in columns]
     weights = [d for _, d, _ in columns]
-    for j in reversed(range(len(D))):
+    for j in reversed(range(lowest, len(D) if highest is None else highest + 1)):
         steps = []
         # a pivot that may be zero starts with its own column: from another, that may hardly reach it, it would take a U
         # without bounds, to which the next one loses its digits

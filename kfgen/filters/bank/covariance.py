@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-from kfgen.filters.algebra.numbers import select
+from collections.abc import Mapping
+from fractions import Fraction
+
+from kfgen.filters.algebra.linalg import Rows, dot, plus, times
+from kfgen.filters.algebra.numbers import Number, select
+from kfgen.filters.bank.mixing import spread
 from kfgen.filters.bank.mode import Mode
 from kfgen.filters.bank.trace import BankTrace
 from kfgen.filters.base import CONST_KF, KF
 from kfgen.filters.steps.covariance import covariance_argument
+from kfgen.filters.steps.outputs import outputs_function
+from kfgen.filters.steps.resetting import seen_at
 from kfgen.geometry import heaviest
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
-from kfgen.ir.trace import Array, Value
+from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
 
 
 class BankCovariance:
-    """Traces set_covariance and get_covariance. outdated: as in CovarianceCode, of all modes."""
+    """Traces set_covariance, get_covariance and get_outputs. outdated: as in CovarianceCode, of all modes."""
 
     def __init__(self, model: Model, modes: list[Mode], outdated: tuple[str, ...]) -> None:
         self.model = model
         self.modes = modes
         self.outdated = outdated
-        self.n = len(model.states)
+        self.n = len(model.errors)
         tables: dict[tuple[int, ...], str] = {}
         for mode in modes:  # one table for modes of the same inner order
             code = mode.filter.covariance
@@ -69,9 +76,12 @@ class BankCovariance:
             t.name(total, "value")
             t.store("P", i * n + j, total)
             t.store("P", j * n + i, total)
-        for mode, m in zip(self.modes, mu, strict=True):
+        for mode, m, d in zip(self.modes, mu, deviations, strict=True):
             with t.of(mode.scope()):
                 t.section("its own")
+                if self.model.rotations:
+                    self._add_turned(t, mode, m, [d[i] for i in range(n)])
+                    continue
                 code = mode.filter.covariance
                 at = code.place(t)
                 with t.loop("j", 0, n) as j, t.loop("i", 0, j + 1) as i:
@@ -85,6 +95,58 @@ class BankCovariance:
             "The covariance of the combined state: the modes' own, and their spread.", returns="void",
         )  # fmt: skip
 
+    def _add_turned(self, t: BankTrace, mode: Mode, m: Value, apart: list[Value]) -> None:
+        """+ m J P J^T of a mode, as it is seen from the mean."""
+        n, code = self.n, mode.filter.covariance
+        at = code.place(t)
+        own = t.array("own", n * n)
+        with t.loop("j", 0, n) as j, t.loop("i", 0, j + 1) as i:
+            value = t.name(mode.filter.form.get(t, i, j), "value")
+            own[at(i) * n + at(j)] = value
+            own[at(j) * n + at(i)] = value
+        J = seen_at(t, self.model, list(range(n)), apart)
+        for r in self.model.rotations:
+            index = range(r.first_error, r.first_error + 3)
+            for step, start in ((1, n), (n, 1)):  # rows, then columns
+                with t.loop("k", 0, n) as k:
+                    old = [t.name(own[k * step + i * start], "old") for i in index]
+                    for a in index:
+                        own[k * step + a * start] = t.value(dot([J[a][b] for b in index], list(old)))
+        with t.loop("k", 0, n * n) as k:
+            t.store("P", k, t.element("P", k) + m * own[k])
+    def isolate(self, t: Trace, variances: Mapping[int, Value]) -> None:
+        """As a filter by itself does, in every mode."""
+        assert isinstance(t, BankTrace)
+        for mode in self.modes:
+            with t.of(mode.scope()):
+                mode.filter.isolate(t, variances)
+
+    def outputs(self, taken: frozenset[str], smallest: Fraction) -> list[Function]:
+        """What tells the outputs, where there are some."""
+        if not self.model.outputs:
+            return []
+        t = BankTrace(smallest)
+        return [outputs_function(t, self.model, lambda J: self._variances(t, J), taken)]
+
+    def _variances(self, t: BankTrace, J: Rows) -> list[Number]:
+        """The diagonal of J P J^T (k,), of P = sum of mu_i (P_i + d_i d_i^T)."""
+        mu = [t.name(t.element("kf.mu", i), f"mu_{mode.name}") for i, mode in enumerate(self.modes)]
+        totals: list[Number] = [0] * len(J)
+        deviations = self._deviations(t, mu)
+        for mode, m, d in zip(self.modes, mu, deviations, strict=True):
+            with t.of(mode.scope()):
+                seen = J
+                if self.model.rotations:  # by an error at the mode's own attitude
+                    T = seen_at(t, self.model, list(range(self.n)), [d[i] for i in range(self.n)])
+                    columns = list(zip(*T, strict=True))
+                    seen = [[t.value(dot(row, list(column))) for column in columns] for row in J]
+                own = mode.filter.variances(t, seen)
+                apart = [dot(row, [d[i] for i in range(self.n)]) for row in J]
+                totals = [
+                    plus(total, times(m, plus(v, times(a, a)))) for total, v, a in zip(totals, own, apart, strict=True)
+                ]
+        return totals
+
     def _deviations(self, t: BankTrace, mu: list[Value]) -> list[Array]:
         """x of each mode less the mean; periodic states about the mode of the largest probability."""
         states, n = self.model.states, self.n
@@ -93,9 +155,16 @@ class BankCovariance:
         for mode in self.modes:
             with t.of(mode.scope()):
                 arrays.append(t.array("d", n))
-                x.append([t.element("kf.x", k) for k in range(n)])
-        for k, (name, part) in enumerate(zip(states, self.model.parts, strict=True)):
-            base = x[0][k]
+                x.append([t.element("kf.x", k) for k in range(len(states))])
+        if self.model.rotations:
+            weights: list[Number] = list(mu)
+            apart = spread(t, self.model, x, weights, 0).apart
+            for i, array in enumerate(arrays):
+                for k, v in enumerate(apart.get(i, [t.zero] * n)):
+                    array[k] = v
+            return arrays
+        for k, _, part in self.model.space.singles:
+            base, name = x[0][k], states[k]
             if not part.flat:
                 base = t.name(heaviest([own[k] for own in x], mu, select), f"{name}_base")
             d = [part.local(own[k], base) for own in x]

@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import sympy
-
-from kfgen.filters.algebra.dual import Dual, Evaluator
 from kfgen.filters.algebra.numbers import Number, assume_positive, is_zero, select
 from kfgen.filters.bank.covariance import BankCovariance
 from kfgen.filters.bank.loops import Source, mixed_in_loops
-from kfgen.filters.bank.mixing import Estimate, mixed, normalised, spread, transition
+from kfgen.filters.bank.mixing import Estimate, mixed, normalised, seen_from_mean, spread, transition
 from kfgen.filters.bank.mode import Mode
+from kfgen.filters.bank.switching import switching
 from kfgen.filters.bank.trace import BankTrace, Scope
 from kfgen.filters.base import KF, Block, FilterCode, ModeNote
 from kfgen.filters.frame import guards
@@ -26,7 +24,7 @@ from kfgen.filters.kinds.single import LONG_FUNCTIONS, SingleFilter
 from kfgen.filters.steps import process
 from kfgen.filters.steps.gate import gate, store_outcome
 from kfgen.filters.steps.phases import Judged, Made, Phases, begin_predict, begin_update, predict_doc, update_name
-from kfgen.filters.steps.process import Step
+from kfgen.filters.steps.sensor import used_errors
 from kfgen.filters.steps.state import NIS, StateCode
 from kfgen.ir.program import Function
 from kfgen.ir.schedule import schedule
@@ -48,14 +46,14 @@ class Imm:
         self.lively = bank.lively(scalar.smallest, scalar.probability)
         self.modes = [Mode(name, f, (*f.own_blocks(), NIS)) for name, f in zip(bank.names, filters, strict=True)]
         forms = [f.form for f in filters]
-        self.mixers = [form.mixer(forms) for form in forms]
+        # loops go through whole states, of which a quaternion is no part
+        self.mixers = [None if self.model.rotations else form.mixer(forms) for form in forms]
         outdated = tuple(mode.path("kept") for mode in self.modes if mode.filter.outdated)
         fields = [field for mode in self.modes for field in mode.fields()]
         mu = Block("mu", len(self.modes), "probabilities of the modes", initial=bank.mu0)
         states = ("kf.x", *(mode.path("x") for mode in self.modes))
-        self.outdated = outdated
-        self.state = StateCode(self.model, (mu, *fields), (), outdated, states, bank.sensors)
-        self.covariance = BankCovariance(self.model, self.modes, outdated)
+        self.outdated, self.covariance = outdated, BankCovariance(self.model, self.modes, outdated)
+        self.state = StateCode(self.model, (mu, *fields), (), outdated, states, bank.sensors, self.covariance.isolate)
 
     def code(self, taken: frozenset[str]) -> FilterCode:
         """The complete filter. taken: names that locals must not have."""
@@ -66,10 +64,11 @@ class Imm:
             if sensor.spec.partial:
                 functions.append(self.update(k, taken, partial=True))
         functions += [self.state.set_state(taken), *self.covariance.functions(taken)]
+        functions += self.covariance.outputs(taken, self.scalar.smallest)
         if self.outdated:
             functions.append(self.redraw(taken))
         remarks = [f"{mode.name}: {text}" for mode in self.modes for text in mode.filter.remarks()]
-        straight = list(range(len(self.model.states)))
+        straight = list(range(len(self.model.errors)))
         tables = {name: table for mode in self.modes for name, table in mode.filter.form.tables.items()}
         notes = []
         for mode in self.modes:
@@ -128,12 +127,12 @@ class Imm:
 
     def predict(self, taken: frozenset[str]) -> Function:
         """All modes mixed, then each predicted; mu <- M^T mu."""
-        t = BankTrace(self.scalar.smallest)
-        arguments, step = begin_predict(t, self.model)
+        t = BankTrace(self.scalar.smallest, self.scalar.epsilon)
+        arguments, step = begin_predict(t, self.model, self.state.first)
         scopes = [mode.scope() for mode in self.modes]
         mu = self._mu(t)
         t.section("probabilities after a switch, and of the mode before, given the mode now")
-        w, c = transition(t, self.transition(t, step), mu)
+        w, c = transition(t, switching(t, self.bank, step), mu)
         for mode, value in zip(self.modes, c, strict=True):
             t.name(value, f"c_{mode.name}")
         for i, before in enumerate(self.modes):
@@ -157,24 +156,6 @@ class Imm:
         guards.settled(t, self.model)
         names = taken | {a.name for a in arguments}
         return Function("predict", arguments, schedule(t, names), predict_doc(self.model))
-
-    def transition(self, t: BankTrace, step: Step) -> list[list[Value]]:
-        """M (B, B); rows that do not sum to 1 by what they are, are normalised."""
-        given = process.parameters_and_inputs(t, self.model, inputs=False)
-        if step.dt is not None:
-            given["dt"] = Dual(step.dt)
-        evaluator = Evaluator(t, self.model, given)
-        rows = [[evaluator.value(e) for e in row] for row in self.bank.transition]
-        sums = [sum(row[1:], row[0]) for row in rows]
-        exact = [sympy.expand(sum(row)) == 1 for row in self.bank.transition]
-        varying = [v for row in rows for v in row if v.constant is None]
-        guards.finite(t, varying)
-        empty = [total <= 0 for total, ok in zip(sums, exact, strict=True) if not ok]
-        guards.positive(t, [*(v < 0 for v in varying), *empty])
-        return [
-            row if ok else [v / assume_positive(total) for v in row]
-            for row, total, ok in zip(rows, sums, exact, strict=True)
-        ]
 
     def _mix_all(self, t: BankTrace, scopes: list[Scope], w: list[list[Number]]) -> None:
         """Have every mode start from its mixture."""
@@ -205,7 +186,10 @@ class Imm:
         with t.of(scope):
             t.section("where it starts from")
             mixture = spread(t, self.model, [part.x for part in parts], w, own)
-            x = [part.placed(v) for v, part in zip(mixture.mean, self.model.parts, strict=True)]
+            x = list(mixture.mean)
+            for i, _, part in self.model.space.singles:
+                x[i] = part.placed(x[i])
+            parts = seen_from_mean(t, self.model, parts, mixture)
             P = mixed(t, parts, w, mixture, own)
             with t.capture() as captured:
                 mode.filter.form.straight().store(t, P, mode.filter.names, after_predict=False)
@@ -217,20 +201,21 @@ class Imm:
 
     def update(self, k: int, taken: frozenset[str], partial: bool = False) -> Function:
         """Each mode updated; mu_j <- mu_j exp(l_j), normalised."""
-        t = BankTrace(self.scalar.smallest)
+        t = BankTrace(self.scalar.smallest, self.scalar.epsilon)
         sensors = [self._sensor(mode, k) for mode in self.modes]
         models = [mode.model.of(sensor) for mode, sensor in zip(self.modes, sensors, strict=True)]
-        arguments, used = begin_update(t, models, sensors, partial)
-        self.state.initialize(t, sensors[0], used)
+        arguments, used = begin_update(t, models, sensors, partial, self.state.first)
+        self.state.first.run(t, sensors[0], used)
+        counted = used_errors(sensors[0], used)
         scopes = [mode.scope() for mode in self.modes]
         runs: list[tuple[Scope, Phases]] = []
         first: list[Judged | Made] = []
         for mode, scope, sensor in zip(self.modes, scopes, sensors, strict=True):
-            runs.append((scope, mode.filter.of(sensor).updating(t, sensor, used)))
+            runs.append((scope, mode.filter.of(sensor).updating(t, sensor, counted)))
             first.append(_advance(t, *runs[-1]))
         t.settle()
         judged = [phase.nis for phase in first if phase.nis is not None]
-        gate(t, self.model, sensors, judged, used)
+        gate(t, self.model, sensors, judged, counted)
         made: list[Made] = []
         for run, phase in zip(runs, first, strict=True):
             while isinstance(phase, Judged):
@@ -241,7 +226,7 @@ class Imm:
         self._store(t, runs, self.combined(t, made, mu), mu)
         fields = [mode.path("nis") for mode in self.modes]
         store_outcome(t, self.model, sensors, judged, log_likelihood, fields)
-        guards.settled(t, self.model)
+        guards.settled(t, self.model, sensors[0])
         name, doc = update_name(sensors[0], partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
 

@@ -75,7 +75,7 @@ def _state(
     columns = [(space.array(f"spread{k}", n), step.weight) for k, step in enumerate(steps)]
 
     def state(k: int | Value) -> None:
-        part = model.parts[k] if isinstance(k, int) else Line()
+        part = model.space.singles[k][2] if isinstance(k, int) else Line()
         values = [source.state(k) for source in sources]
         base = values[0] if part.flat else t.name(heaviest(values, weights, select), "base")
         deltas: Vector = [0 if value is base else part.local(value, base) for value in values]
@@ -89,7 +89,7 @@ def _state(
 
     start = 0
     for stop in range(n + 1):
-        if stop < n and model.parts[stop].flat:
+        if stop < n and model.space.singles[stop][2].flat:
             continue
         if stop - start == 1:
             state(start)

@@ -8,7 +8,7 @@ B modes takes B - 1 columns, and none is ever taken away.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from kfgen.filters.algebra import linalg
@@ -25,6 +25,8 @@ from kfgen.filters.algebra.numbers import (
 from kfgen.filters.algebra.rank_one import rank_one
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.base import Straight
+from kfgen.filters.covariance.noise import Given
+from kfgen.filters.steps.resetting import seen_at
 from kfgen.geometry import heaviest
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
@@ -41,10 +43,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Spread:
-    """The mean (n,) of a mixture, not wrapped, and its spread, as columns (n,) with their weights. Spec's order."""
+    """The mean of a mixture, angles not wrapped, and its spread, as columns (n,) with their weights. Spec's order.
+
+    apart: of models with rotations, how far each mode is from the mean (n,)."""
 
     mean: list[Value]
     columns: list[tuple[Vector, Number]]
+    apart: dict[int, list[Value]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -77,16 +82,18 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
     """Of modes whose weights sum to 1. first: the mode that the others join."""
     parts = [first, *(i for i in range(len(states)) if i != first)]
     parts = [i for i in parts if not is_zero(weights[i])]
+    if model.rotations:
+        return _turned(t, model, states, weights, parts)
     base: list[Value] = list(states[parts[0]])
     straight = sorted(parts)
-    for k, part in enumerate(model.parts):
+    for k, _, part in model.space.singles:
         if not part.flat and len(parts) > 1:
             base[k] = t.name(heaviest([states[i][k] for i in straight], [weights[i] for i in straight], select),
                              f"{model.states[k]}_base")  # fmt: skip
     deltas: list[Vector] = []
     for i in parts:
         delta: Vector = []
-        for k, part in enumerate(model.parts):
+        for k, _, part in model.space.singles:
             delta.append(0 if base[k].node is states[i][k].node else part.local(states[i][k], base[k]))
         deltas.append(delta)
     mean = deltas[0]
@@ -96,6 +103,46 @@ def spread(t: Trace, model: Model, states: list[list[Value]], weights: list[Numb
         columns.append((e, step.weight))
         mean = [plus(m, times(step.share, d)) for m, d in zip(mean, e, strict=True)]
     return Spread([t.value(plus(b, m)) for b, m in zip(base, mean, strict=True)], columns)
+
+
+def _turned(t: Trace, model: Model, states: list[list[Value]], weights: list[Number], parts: list[int]) -> Spread:
+    """The same about the mode of the largest weight, in the tangent space there: the distances are those from the
+    mean."""
+    base = list(states[parts[0]])
+    if len(parts) == 1:
+        return Spread(base, [], {})
+    straight, space = sorted(parts), model.space
+    for k in range(space.size):
+        chosen = heaviest([states[i][k] for i in straight], [weights[i] for i in straight], select)
+        base[k] = t.name(chosen, f"{model.states[k]}_base")
+    deltas = {i: space.local(states[i], base) for i in parts}
+    shift = [t.value(linalg.dot([weights[i] for i in parts], [deltas[i][j] for i in parts]))
+             for j in range(space.dimension)]  # fmt: skip
+    mean = space.retract(base, shift)
+    apart = {}
+    for i in parts:
+        d = [t.value(a - b) for a, b in zip(deltas[i], shift, strict=True)]
+        for r in model.rotations:
+            own = slice(r.first, r.first + 4)
+            d[r.first_error : r.first_error + 3] = r.geometry.local(states[i][own], mean[own])
+        apart[i] = [t.name(v, f"apart_{name}") for v, name in zip(d, model.errors, strict=True)]
+    for i, j, _ in space.singles:
+        mean[i] = base[i] + shift[j]
+    columns: list[tuple[Vector, Number]] = [(list(d), weights[i]) for i, d in apart.items()]
+    return Spread(mean, columns, apart)
+
+
+def seen_from_mean(t: Trace, model: Model, parts: list[Estimate], spreads: Spread) -> list[Estimate]:
+    """The covariances of modes as they are seen from the mean: J P J^T, J = d((x_i [+] d) [-] x)/dd."""
+    out = []
+    for i, part in enumerate(parts):
+        if i in spreads.apart:
+            n, form = part.form.n, part.form
+            J = seen_at(t, model, form.order, spreads.apart[i])
+            P = form.turned(t, part.P, J, Given([[t.zero] * n for _ in range(n)]), [])
+            part = Estimate(part.x, form, P)
+        out.append(part)
+    return out
 
 
 def mixed(t: Trace, parts: list[Estimate], weights: list[Number], spreads: Spread, own: int) -> Any:

@@ -34,8 +34,8 @@ class BankTrace(Trace):
 
     in_place = False
 
-    def __init__(self, smallest: Fraction | int = 0) -> None:
-        super().__init__(smallest)
+    def __init__(self, smallest: Fraction | int = 0, epsilon: Fraction = Fraction(1, 2**52)) -> None:
+        super().__init__(smallest, epsilon)
         self.scope: Scope | None = None
         self.captured: dict[str, dict[int, Value]] | None = None
         self._later: list[tuple[Scope, Value, str]] = []

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
+from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.motion import Moved
+from kfgen.filters.covariance.noise import Additive
 from kfgen.ir.trace import Trace, Value
 
 
-class StraightLine:
+class StraightLine(ABC):
     """Every number is a value of its own."""
 
     indexed = False
@@ -29,6 +32,13 @@ class StraightLine:
 
     def kept(self, t: Trace, x: list[Value], before: list[Value]) -> list[Value]:
         return x
+
+    def turned(self, t: Trace, P: Any, T: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Any:
+        return self.predict(t, P, T, Q, noise)
+
+    @abstractmethod
+    def predict(self, t: Trace, P: Any, F: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Any:
+        """See Form."""
 
     def at_rest(self, t: Trace, P: Any) -> Moved:
         return Moved(t, self.order, [0] * len(self.order))

@@ -7,59 +7,29 @@ update: see `sequence`. The filters that linearise otherwise are subclasses: iek
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 from kfgen.filters.algebra.linalg import Vector, dot, plus
 from kfgen.filters.algebra.numbers import assume_positive, is_positive, positive_within, require_nonnegative
 from kfgen.filters.algebra.symmetric import Symmetric
-from kfgen.filters.covariance.base import Form
 from kfgen.filters.covariance.noise import Additive, Given
-from kfgen.filters.covariance.parts import Learning, Motion
+from kfgen.filters.covariance.parts import Motion
 from kfgen.filters.frame import guards
 from kfgen.filters.kinds.single import SingleFilter
+from kfgen.filters.kinds.work import Learnt, Update
 from kfgen.filters.steps import process
-from kfgen.filters.steps.adapt import AdaptedR
-from kfgen.filters.steps.compensation import Rests
 from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.process import Advance, Prior, Step
+from kfgen.filters.steps.resetting import moving
 from kfgen.filters.steps.sensor import Innovation, Linearised, SensorCode, decorrelated, masked, total
 from kfgen.filters.steps.sequence import Sequence, Updated, departs
+from kfgen.geometry import Turn
 from kfgen.ir.trace import Trace, Value
 from kfgen.model.model import SensorModel
 
 Final = Generator[Judged | Made, None, Updated[Any]]
 """Yields as Phases do, and returns the update that is made."""
-
-
-@dataclass
-class Update:
-    """What an update of one sensor works with. used: whether each component counts, where a mask tells."""
-
-    t: Trace
-    sensor: SensorModel
-    code: SensorCode
-    x: list[Value]  # in the spec's order
-    form: Form[Any]
-    used: list[Value] | None
-    adapted: AdaptedR | None
-    tested: list[Value] = field(default_factory=list)  # what else has to be finite
-    rests: Rests = field(default_factory=dict)  # of compensated states, after the update
-    free: list[Value] = field(default_factory=list)  # x after the update, before bounds
-
-    @cached_property
-    def P(self) -> Any:
-        """As it stands in the struct, read when it is first needed."""
-        return self.form.load(self.t)
-
-
-@dataclass
-class Learnt:
-    """What an update leaves for an adapted R (m,), and the next Q."""
-
-    residual: Vector = field(default_factory=list)
-    Q: Learning | None = None
 
 
 class Ekf(SingleFilter):
@@ -119,12 +89,15 @@ class Ekf(SingleFilter):
         """The update of the estimate in the struct. used: whether each component counts, where a mask tells."""
         t.section("innovation")
         code = SensorCode(t, self.model, sensor, self.order, self.derivatives, self.skipped(sensor))
+        code.counts = used
         u = Update(t, sensor, code, code.prior(), self.form, used, self.adapted_R(sensor))
         linear = self.compensation.corrected(t, self.linearise(u), self.order)
         innovation = self.innovation(u, linear)
         result = self.sequence(u, innovation, plain=True)
         final = yield from self.final(u, innovation, result)
         x = self.moved(u, final.motion)
+        if u.turns:
+            final = replace(final, P=self.reset(u, final.P))
         inflates = self.model.options.inflation is not None and not self.form.factored
         evidence = self.unconfined(x) + self.form.evidence(final.P, after_predict=inflates)
         P = self.limited(t, final.P)
@@ -169,12 +142,14 @@ class Ekf(SingleFilter):
         innovation = decorrelated(u.t, linear, R, u.used, smallest)
         for r in innovation.variances:
             require_nonnegative(r, "a measurement variance is negative")
-            self.suppose(r)
+            self.suppose(u.sensor, r)
         return innovation
 
-    def suppose(self, r: Value) -> None:
+    def suppose(self, sensor: SensorModel, r: Value) -> None:
         """Take a variance for positive that is not 0 within the declared ranges: 0 is then no case of its own."""
-        if self.scalar.uniform and not is_positive(r) and positive_within(r, process.declared_signs(self.model)):
+        if not self.scalar.uniform or is_positive(r):
+            return
+        if positive_within(r, process.declared_signs(self.model, sensor)):
             assume_positive(r)
 
     def spread(self, u: Update, linear: Linearised) -> Symmetric:
@@ -194,10 +169,10 @@ class Ekf(SingleFilter):
             return plain
         return self.sequence(u, innovation, plain=False)
 
-    def sequence(self, u: Update, innovation: Innovation, plain: bool) -> Updated[Any]:
-        """The components one by one. plain: the textbook's update."""
-        names = [c.name for c in u.sensor.spec.components]
-        return Sequence(u.t, self.model, self.form, names, plain, self.scalar.epsilon).run(u.P, innovation)
+    def sequence(self, u: Update, innovation: Innovation, plain: bool, P: Any = None) -> Updated[Any]:
+        """The components one by one. plain: the textbook's update. P: in place of that of the struct."""
+        sequence = Sequence(u.t, self.model, self.form, list(u.sensor.errors), plain, self.scalar.epsilon)
+        return sequence.run(u.P if P is None else P, innovation)
 
     def judged(self, u: Update, innovation: Innovation, plain: Updated[Any]) -> Phases:
         """Guards, and then the gate, over the textbook's update. A far outlier may overflow nis and is gated all the
@@ -250,11 +225,54 @@ class Ekf(SingleFilter):
 
     def moved(self, u: Update, motion: Motion) -> list[Value]:
         """x after the update, in the spec's order, before bounds and wrapping."""
+        if self.model.rotations:
+            return self.retracted(u, motion)
         x = motion.state(u.x, self.model.states, self.covariance.place)
         dx = motion.entries() if self.compensation.states else []
         steps = {i: u.t.value(dx[self.order.index(i)]) for i in self.compensation.states}
         compensated, u.rests = self.compensation.moved(u.t, u.x, steps)
         return [compensated[i] if i in u.rests else value for i, value in enumerate(x)]
+
+    def retracted(self, u: Update, motion: Motion) -> list[Value]:
+        """x [+] d. The turns of the rotations are kept for the reset."""
+        t, model = u.t, self.model
+        d = self.by_error(t, motion)
+        x = list(u.x)
+        turns = []
+        for r in model.rotations:
+            by, first = d[r.first_error : r.first_error + 3], r.first_error
+            if u.base is not None and u.apart is not None:
+                x[r.first : r.first + 4] = u.base[r.first : r.first + 4]
+                by = [a - b for a, b in zip(by, u.apart[first : first + 3], strict=True)]
+            turns.append(Turn([t.name(a, f"d_{name}") for a, name in zip(by, r.errors, strict=True)]))
+        u.turns = turns
+        for i, j, _ in model.space.singles:
+            x[i] = t.name(t.value(plus(x[i], d[j])), f"{model.states[i]}_next")
+        for r, turn in zip(model.rotations, u.turns, strict=True):
+            new = r.geometry.turned(x[r.first : r.first + 4], turn)
+            x[r.first : r.first + 4] = [t.name(a, f"{part}_next") for a, part in zip(new, r.parts, strict=True)]
+        steps = {i: d[k] for i in self.compensation.states if (k := model.space.errors_of[i]) is not None}
+        compensated, u.rests = self.compensation.moved(t, u.x, steps)
+        return [compensated[i] if i in u.rests else value for i, value in enumerate(x)]
+
+    def by_error(self, t: Trace, motion: Motion) -> list[Value]:
+        """By what an update moves, in the spec's order."""
+        d = [t.zero] * len(self.order)
+        for place, m in zip(self.order, motion.entries(), strict=True):
+            d[place] = t.value(m)
+        return d
+
+    def nothing(self, t: Trace) -> Additive:
+        """No noise."""
+        return Given([[t.zero] * len(self.order) for _ in self.order])
+
+    def reset(self, u: Update, P: Any) -> Any:
+        """P of the errors as they are seen from the new attitudes: T P T^T."""
+        turned = [(r, turn) for r, turn in zip(self.model.rotations, u.turns, strict=True) if r.reset]
+        if not turned:
+            return P
+        u.t.section("reset: the errors as seen from the new attitude")
+        return self.form.turned(u.t, P, moving(u.t, self.model, self.order, turned), self.nothing(u.t), [])
 
 
 FILTERS = {"kf": Ekf, "ekf": Ekf}

@@ -10,12 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from kfgen.filters.algebra.dual import Dual, Evaluator, Hessian
+from kfgen.filters.algebra.dual import Dual, Evaluator
+from kfgen.filters.algebra.gradient import Hessian
 from kfgen.filters.algebra.linalg import Rows, plus, times
 from kfgen.filters.algebra.numbers import Number, is_nonnegative, is_zero
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.noise import Additive, Computed, Given
-from kfgen.filters.kinds.ekf import Ekf, Update
+from kfgen.filters.kinds.ekf import Ekf
+from kfgen.filters.kinds.work import Update
 from kfgen.filters.steps.compensation import with_means
 from kfgen.filters.steps.process import Advance, Prior, Step
 from kfgen.filters.steps.sensor import Linearised

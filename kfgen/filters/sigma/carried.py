@@ -6,11 +6,13 @@ does not jump, is as good as a number: its points may spread over more than a pe
 
 from __future__ import annotations
 
-from kfgen.filters.algebra.dual import Dual, Evaluator
+from kfgen.filters.algebra.dual import Dual, Evaluator, held_attitudes, state_seeds
 from kfgen.filters.sigma import cloud
 from kfgen.filters.steps import process
 from kfgen.geometry.line import Line
 from kfgen.geometry.part import Part
+from kfgen.geometry.rotation import Rotation
+from kfgen.geometry.space import Space
 from kfgen.ir.trace import Trace
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
@@ -20,54 +22,66 @@ def by_process(model: Model) -> tuple[str, ...]:
     held = [w.name for w in model.noises if not w.density]
     index = [i for i, w in enumerate(model.noises) if not w.density]
     C = tuple(tuple(model.noise_covariance[i][j] for j in index) for i in index)
-    return cloud.carried_by(model, _step(model), held, C, model.spec.filter.augment)
+    return cloud.carried_by(model, _step(model, turning=False), held, C, model.spec.filter.augment)
 
 
 def by_sensor(model: Model, sensor: SensorModel) -> tuple[str, ...]:
     names = [w.name for w in sensor.noises]
     if not names:
         return ()
-    return cloud.carried_by(model, _seen(model, sensor), names, sensor.noise_covariance, model.spec.filter.augment)
+    seen = _seen(model, sensor, turning=False)
+    return cloud.carried_by(model, seen, names, sensor.noise_covariance, model.spec.filter.augment)
 
 
-def images_of_process(model: Model) -> tuple[Part, ...]:
-    """The geometry of each state as f leaves it."""
-    if all(part.flat for part in model.parts):
-        return model.parts
-    return _images(model, _step(model), model.parts)
+def images_of_process(model: Model) -> Space:
+    """The geometry of the state as f leaves it."""
+    return model.space if model.space.flat else _images(model, _step(model), model.space)
 
 
-def images_of_sensor(model: Model, sensor: SensorModel) -> tuple[Part, ...]:
-    """The geometry of each component as h leaves it."""
-    if all(part.flat for part in sensor.parts):
-        return sensor.parts
-    return _images(model, _seen(model, sensor), sensor.parts)
+def images_of_sensor(model: Model, sensor: SensorModel) -> Space:
+    """The geometry of the components as h leaves them."""
+    return sensor.space if sensor.space.flat else _images(model, _seen(model, sensor), sensor.space)
 
 
-def _images(model: Model, after: list[Dual], parts: tuple[Part, ...]) -> tuple[Part, ...]:
-    turning = [name for name, part in zip(model.states, model.parts, strict=True) if not part.flat]
-    return tuple(
-        Line() if cloud.passes(dual, turning) else part for dual, part in zip(after, parts, strict=True)
-    )  # fmt: skip
+def _images(model: Model, after: list[Dual], space: Space) -> Space:
+    turning = [model.errors[j] for _, j, part in model.space.singles if not part.flat]
+    parts: dict[int, Part | Rotation] = {
+        i: Line() if cloud.passes(after[i], turning) else part for i, _, part in space.singles
+    }
+    parts |= {i: rotation for i, _, rotation in space.rotations}
+    return Space(tuple(parts[i] for i in sorted(parts)))
 
 
-def _step(model: Model) -> list[Dual]:
-    """The states after a step, by x and the noises per step."""
+def _step(model: Model, turning: bool = True) -> list[Dual]:
+    """The states after a step, by x and the noises per step; the rates of rotations beside them where these are not to
+    turn."""
     t = Trace()
     held = [w.name for w in model.noises if not w.density]
     step = process.step_length(t, model)
     prior = process.given(t, model, step)
     duals = {**prior.duals, **cloud.symbolic_noises(t, held)}
-    return process.advance(t, model, process.Prior(prior.x, duals), step).after
+    if turning or not model.rotations:
+        return process.advance(t, model, process.Prior(prior.x, duals), step).after
+    still = {**duals, **held_attitudes(t, model)}
+    after = process.advance(t, model, process.Prior(prior.x, still), step).after
+    if model.spec.dynamics.form != "discrete":
+        return after
+    evaluator = Evaluator(t, model, duals)
+    turns = [evaluator(e) for turn in model.turns for e in turn or ()]
+    # what a new quaternion is made of is not linear in its noise
+    bent = [Dual(d.value, {w: g * t.element("kf.x", 0) for w, g in d.gradient.items()}) for d in turns]
+    return [*after, *bent]
 
 
-def _seen(model: Model, sensor: SensorModel) -> list[Dual]:
-    """h by x and the sensor's noises."""
+def _seen(model: Model, sensor: SensorModel, turning: bool = True) -> list[Dual]:
+    """h by x and the sensor's noises. turning: whether the attitude counts as a state."""
     t = Trace()
     used = model.uses(*sensor.h)
-    x = {name: Dual(t.element("kf.x", i), {name: t.one}) for i, name in enumerate(model.states)}
+    x = state_seeds(t, model, [t.element("kf.x", i) for i in range(len(model.states))])
+    if not turning:
+        x |= held_attitudes(t, model)
     noises = cloud.symbolic_noises(t, [w.name for w in sensor.noises])
-    duals = {**x, **noises, **process.parameters_and_inputs(t, model)}
+    duals = {**x, **noises, **process.parameters_and_inputs(t, model, sensor=sensor)}
     if "t" in used:
         duals["t"] = process.time_now(t, model)
     if model.dt is not None:

@@ -6,10 +6,10 @@ from fractions import Fraction
 from typing import Any
 
 from kfgen.filters.algebra.dual import Dual, Evaluator
-from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.linalg import Rows, Vector, dot
 from kfgen.filters.algebra.numbers import is_zero
 from kfgen.filters.covariance.base import Form
-from kfgen.filters.covariance.noise import Given
+from kfgen.filters.covariance.noise import Additive, Given
 from kfgen.filters.covariance.parts import Gatherer, Gathering
 from kfgen.filters.frame import guards
 from kfgen.filters.kinds.single import SingleFilter
@@ -21,6 +21,8 @@ from kfgen.filters.sigma.points import PointSet
 from kfgen.filters.steps import process
 from kfgen.filters.steps.phases import Made, Phases
 from kfgen.filters.steps.process import Step
+from kfgen.filters.steps.resetting import moving
+from kfgen.geometry import Turn
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
@@ -43,8 +45,9 @@ class Propagation:
         self.drawing = drawing
         self.f = f
         self.absorb = absorb
-        self.n = len(model.states)
-        self.parts = images_of_process(model)
+        self.n = len(model.errors)
+        self.images = images_of_process(model)
+        self.turning = bool(model.rotations)
 
     def predicting(self, filter_: SingleFilter, t: Trace, step: Step) -> Phases:
         """The step from the estimate in the struct. filter_: it limits and stores what comes out."""
@@ -56,7 +59,10 @@ class Propagation:
         noise, tested = self._noise_root(t, prior.duals)
         stride = self.n + len(self.carried)
         array = t.array("points", len(self.points.rows) * stride)
-        failures = self.drawing.around(t, P0, noise, self.points, array, prior.x)
+        if self.turning:
+            failures = self.drawing.scatter(t, P0, noise, self.points, array)
+        else:
+            failures = self.drawing.around(t, P0, noise, self.points, array, prior.x)
         x, P, failed, shift = self._propagated(t, array, stride, prior.x, result, step, bool(filter_.outdated))
         failures += failed
         for value, name in zip(x, model.states, strict=True):
@@ -73,7 +79,7 @@ class Propagation:
         guards.finite(t, [*x, *evidence, *tested])
         guards.positive(t, failures)
         yield Made(x, P)
-        filter_.store(t, x, set(range(self.n)), P, after_predict=True)
+        filter_.store(t, x, set(range(len(x))), P, after_predict=True)
         if filter_.outdated:
             self._keep(t, array, shift, free, x, limits)
 
@@ -91,7 +97,13 @@ class Propagation:
         array is to hold the deviations."""
         model, n, points, f = self.model, self.n, self.points, self.f
         count = len(points.rows)
-        if points.centre or not all(part.flat for part in self.parts):
+        if self.turning:
+            base = [t.name(value, f"{name}_centre") for value, name in zip(result.x, model.states, strict=True)]
+            for name, values in (("start", x), ("centre", base)):
+                local = t.array(name, len(values))
+                for i, value in enumerate(values):
+                    local[i] = value
+        elif points.centre or not self.images.flat:
             base_array = t.array("centre", stride)
             for i in range(stride):
                 base_array[i] = x[i] if i < n else t.zero
@@ -100,10 +112,13 @@ class Propagation:
                     for i in range(n)]  # fmt: skip
         else:
             base = x  # any base does
-        sums = [t.variable(f"shift_{name}", 0) for name in model.states]
-        names = [model.states[i] for i in self.form.order]
+        sums = [t.variable(f"shift_{name}", 0) for name in model.errors]
+        names = [model.errors[i] for i in self.form.order]
         Q = Given([[result.Q[i][j] for j in self.form.order] for i in self.form.order])
         noise = [([w[i] for i in self.form.order], d) for w, d in result.noise]
+        later = Q, noise
+        if self.turning:  # in the tangent at the mean, to which the rest is moved first
+            Q, noise = Given([[t.zero] * n for _ in range(n)]), []
         common = points.wc[0] if points.uniform else None
         in_loops = self.drawing.in_loops
         how = Gathering(names, common, self.scalar.epsilon, in_loops, self.absorb, checked=not points.positive)
@@ -112,14 +127,23 @@ class Propagation:
         t.section("points through f, and their deviations")
         with t.loop("k", 0, count) as k:
             at = k * stride
-            t.call(f.function, [*f.arguments(step.dt), ("points", at)])
-            rejected = self._rejected(t, array, at, step)
+            ends: list[str | tuple[str, int | Value] | Value] = [("points", at)]
+            if self.turning:
+                ends = [("start", 0), ("centre", 0), ("points", at)]
+            t.call(f.function, [*f.arguments(step.dt), *ends])
+            image = [array[at + i] for i in range(n)]
+            if self.turning:
+                apart = image
+                image = self.images.retract(base, apart) if model.options.rejects else []
+            else:
+                apart = [part.local(cloud.clipped(t, image[i], model.bounds[i]), base[i])
+                         for i, _, part in self.images.singles]  # fmt: skip
+            rejected = self._rejected(t, image, step)
             deviations = []
-            for i, part in enumerate(self.parts):
-                d = part.local(cloud.clipped(t, array[at + i], model.bounds[i]), base[i])
+            for d, name in zip(apart, model.errors, strict=True):
                 if rejected is not None:
                     d = t.select(rejected, t.zero, d)
-                deviations.append(t.name(d, f"dev_{model.states[i]}"))
+                deviations.append(t.name(d, f"dev_{name}"))
             if gather.rewrites or points.theta or keep:
                 for i, d in enumerate(deviations):
                     array[at + i] = d
@@ -130,7 +154,7 @@ class Propagation:
                 inner = [deviations[i] for i in self.form.order]
                 gather.add_row(array, at, inner, common or cloud.weights(t, points.wc, k, "wc"))
         scale = points.wm[0] if points.uniform else Fraction(1)
-        shift = [t.name(s.get() * scale, f"mean_{name}") for s, name in zip(sums, model.states, strict=True)]
+        shift = [t.name(s.get() * scale, f"mean_{name}") for s, name in zip(sums, model.errors, strict=True)]
         inner = [shift[i] for i in self.form.order]
         if points.theta:
             t.section("deviations from the mean")
@@ -140,7 +164,26 @@ class Propagation:
         elif points.extra < 0:
             gather.subtract(inner, -points.extra)
         P, failures = gather.result()
+        if self.turning:
+            x, P = self._turned(t, base, shift, P, *later)
+            return x, P, failures, shift
         return [b + s for b, s in zip(base, shift, strict=True)], P, failures, shift
+
+    def _turned(
+        self, t: Trace, base: list[Value], shift: list[Value], P: Any, Q: Additive, noise: list[tuple[Vector, Value]]
+    ) -> tuple[list[Value], Any]:
+        """The mean base [+] shift, and P as it is seen from there, with what the noises add."""
+        model, x = self.model, list(base)
+        for i, j, _ in model.space.singles:
+            x[i] = base[i] + shift[j]
+        turns = []
+        for r in model.rotations:
+            turn = Turn(shift[r.first_error : r.first_error + 3])
+            x[r.first : r.first + 4] = r.geometry.turned(base[r.first : r.first + 4], turn)
+            turns.append((r, turn))
+        self.seen_from = moving(t, model, self.form.order, turns)
+        t.section("as seen from the mean, and the noise")
+        return x, self.form.turned(t, P, self.seen_from, Q, noise)
 
     def _about_mean(
         self, t: Trace, gather: Gatherer[Any], array: Array, stride: int, inner: Vector, common: Fraction | None
@@ -164,12 +207,11 @@ class Propagation:
                 else:
                     gather.subtract_row(array, at, d, -weight)
 
-    def _rejected(self, t: Trace, array: Array, at: Value, step: Step) -> Value | None:
+    def _rejected(self, t: Trace, image: list[Value], step: Step) -> Value | None:
         """Whether the image of a point is replaced by that of the centre."""
         options, model = self.model.options, self.model
         if not options.rejects:
             return None
-        image = [array[at + i] for i in range(self.n)]
         wild = t.wrapped(t.pool.boolean(False))
         for value in image:
             wild = wild | ~t.finite(value)
@@ -189,8 +231,14 @@ class Propagation:
     ) -> None:
         """Store the points, less x; not those of a covariance that a floor or ceiling has changed."""
         first = self.n if self.points.centre else 0
-        offset = [s + (v - f) if part.flat and not is_zero(f - v) else s
-                  for s, f, v, part in zip(shift, free, x, self.model.parts, strict=True)]  # fmt: skip
+        offset = list(shift)
+        for i, j, part in self.model.space.singles:
+            if part.flat and not is_zero(free[i] - x[i]):
+                offset[j] = shift[j] + (x[i] - free[i])
+        if self.turning:
+            self._keep_turned(t, array, offset, shift, first)
+            self._keep_unless(t, limits)
+            return
         for i, s in enumerate(offset):
             if first:
                 t.store("kf.points", i, -s)
@@ -199,6 +247,33 @@ class Propagation:
                 done = mean if self.rewritten else t.zero  # what it is less already
                 d = array[k * (self.n + len(self.carried)) + i] - (s - done)
                 t.store("kf.points", k * self.n + (i + first), d)
+        self._keep_unless(t, limits)
+
+    def _keep_turned(self, t: Trace, array: Array, offset: list[Value], shift: list[Value], first: int) -> None:
+        """The same of errors, as they are seen from the mean."""
+        T, place = self.seen_from, {i: k for k, i in enumerate(self.form.order)}
+
+        def seen(d: list[Value]) -> list[Value]:
+            out = list(d)
+            for r in self.model.rotations:
+                index = range(r.first_error, r.first_error + 3)
+                for i in index:
+                    out[i] = t.value(dot([T[place[i]][place[j]] for j in index], [d[j] for j in index]))
+            return out
+
+        if first:
+            for i, value in enumerate(seen([-s for s in offset])):
+                t.store("kf.points", i, value)
+        with t.loop("k", 0, len(self.points.rows)) as k:
+            at = k * (self.n + len(self.carried))
+            own = []
+            for i, (s, mean) in enumerate(zip(offset, shift, strict=True)):
+                done = mean if self.rewritten else t.zero  # what it is less already
+                own.append(t.name(array[at + i] - (s - done), f"left_{self.model.errors[i]}"))
+            for i, value in enumerate(seen(own)):
+                t.store("kf.points", k * self.n + (i + first), value)
+
+    def _keep_unless(self, t: Trace, limits: list[Value]) -> None:
         limited = t.wrapped(t.pool.boolean(False))
         for condition in limits:
             limited = limited | condition

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -10,32 +10,23 @@ from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.factors import solved, udu
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.symmetric import Symmetric
+from kfgen.filters.base import image_of
 from kfgen.filters.covariance.base import Solving
 from kfgen.filters.covariance.noise import Given
 from kfgen.filters.frame import guards
-from kfgen.filters.kinds.ekf import Update
+from kfgen.filters.kinds.work import Update
 from kfgen.filters.sigma import cloud
 from kfgen.filters.sigma.carried import images_of_sensor
 from kfgen.filters.sigma.cloud import Private
 from kfgen.filters.sigma.drawing import Drawing, noise_root
 from kfgen.filters.sigma.points import PointSet
+from kfgen.filters.sigma.turned import Seen, mean_of, point, seen_spread
 from kfgen.filters.steps.sensor import Linearised, SensorCode, total
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
-
-
-@dataclass(frozen=True)
-class Seen:
-    """Of m components: z (m,), its covariance without R (m, m), that with the state (n, m) and with the carried
-    noises (q, m)."""
-
-    z: Vector
-    spread: Symmetric
-    cross: Rows
-    noise: Rows
 
 
 class Seeing:
@@ -56,9 +47,9 @@ class Seeing:
         self.carried = carried
         self.drawing = drawing
         self.tolerance = drawing.tolerance
-        self.n, self.m, self.q = len(model.states), len(sensor.h), len(carried)
+        self.n, self.m, self.q = len(model.errors), sensor.dimension, len(carried)
         self.stride = self.n + self.q
-        self.parts = images_of_sensor(model, sensor)
+        self.images = images_of_sensor(model, sensor)
         self.symmetric = not recalls and points.balanced
         self.linear = self._is_linear()
         self.h: Private | None = None
@@ -70,7 +61,7 @@ class Seeing:
             return False
         if any(b is not None for b in model.bounds):
             return False
-        if not all(part.flat for part in self.parts) or any(r is not None for r in sensor.residual):
+        if any(not part.flat for _, _, part in self.images.singles) or any(r is not None for r in sensor.residual):
             return False
         t = Trace()
         code = SensorCode(t, model, sensor, list(range(self.n)))
@@ -80,7 +71,7 @@ class Seeing:
     @property
     def size(self) -> int:
         """Of the array that `see` fills."""
-        return self.m + self.m * (self.m + 1) // 2 + (self.n + self.q) * self.m
+        return len(self.sensor.h) + self.m * (self.m + 1) // 2 + (self.n + self.q) * self.m
 
     def functions(self, taken: frozenset[str]) -> list[Function]:
         """The private functions of the sensor."""
@@ -105,20 +96,23 @@ class Seeing:
         assert self.h is not None
         t = Trace()
         x = [t.name(t.element("x", i), name) for i, name in enumerate(model.states)]
-        point, z = t.array("point", self.stride), t.array("z", m)
+        numbers = len(model.states)
+        at_point, z = t.array("point", numbers + self.q), t.array(image_of(sensor), len(sensor.h))
         store = None if points.theta == 0 else t.array("dz", len(points.rows) * m)
         call = self.h.arguments(None)
         middle = [t.zero] * n
         if self.recalls and points.centre:
-            middle = [t.name(t.element("middle", i), f"{name}_middle") for i, name in enumerate(model.states)]
-        for i in range(self.stride):
-            point[i] = (x[i] + middle[i] if i < n else t.zero)
-        t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
-        names = [c.name for c in sensor.spec.components]
-        base = [t.name(z[a], f"{name}_centre") for a, name in enumerate(names)]
+            middle = [t.name(t.element("middle", i), f"{name}_middle") for i, name in enumerate(model.errors)]
+        for i, value in enumerate(point(model, x, middle)):
+            at_point[i] = value
+        for i in range(self.q):
+            at_point[numbers + i] = t.zero
+        t.call(self.h.function, [*call, ("point", 0), (z.name, 0)])
+        names = list(sensor.errors)
+        base = [t.name(z[a], f"{c.name}_centre") for a, c in enumerate(sensor.spec.components)]
         shift = [t.variable(f"shift_{name}", 0) for name in names]
         spread = {(a, b): t.variable(f"s_{names[a]}_{names[b]}", 0) for b in range(m) for a in range(b + 1)}
-        labels = [*model.states, *self.carried]
+        labels = [*model.errors, *self.carried]
         cross = {(i, a): t.variable(f"c_{labels[i]}_{names[a]}", 0) for i in range(self.stride) for a in range(m)}
         about = not self.symmetric and points.theta != 0
         first = [t.variable(f"m_{label}", 0) for label in labels] if about else []
@@ -126,13 +120,17 @@ class Seeing:
         t.section("points through h")
         with t.loop("k", 0, len(points.rows)) as k:
             at = k * self.stride
-            for i in range(self.stride):
-                own = t.element("cloud", at + i)
-                point[i] = x[i] + own if i < n else own
-            t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
-            apart = [cloud.difference(t, model, sensor, part, a, z[a], base[a], x) for a, part in enumerate(self.parts)]
+            own = [t.element("cloud", at + i) for i in range(self.stride)]
+            for i, value in enumerate([*point(model, x, own[:n]), *own[n:]]):
+                at_point[i] = value
+            t.call(self.h.function, [*call, ("point", 0), (z.name, 0)])
+            apart = [t.zero] * m
+            for i, j, single in self.images.singles:
+                apart[j] = cloud.difference(t, model, sensor, single, i, z[i], base[i], x)
+            for i, j, rotation in self.images.rotations:
+                apart[j : j + 3] = rotation.local([z[i + k] for k in range(4)], base[i : i + 4])
             d = [t.name(v, f"dz_{name}") for v, name in zip(apart, names, strict=True)]
-            part = [t.element("cloud", at + i) for i in range(self.stride)]
+            part = own
             if around:
                 part = [own - shifted for own, shifted in zip(part, middle, strict=True)]
             wm, wc = cloud.weights(t, points.wm, k, "wm"), cloud.weights(t, points.wc, k, "wc")
@@ -158,11 +156,16 @@ class Seeing:
                 for (a, b), variable in spread.items():
                     term = d[a] * d[b] if points.uniform else wc * d[a] * d[b]
                     variable.set(variable.get() + term)
-        for a in range(m):
-            t.store("seen", a, base[a] + delta[a])
-        for (a, b), variable in spread.items():
-            t.store("seen", m + b * (b + 1) // 2 + a, variable.get() * scale_c + delta[a] * delta[b] * points.extra)
-        offset = m + m * (m + 1) // 2
+        mean, seen_from = mean_of(t, self.images, base, delta)
+        for a, value in enumerate(mean):
+            t.store("seen", a, value)
+        first_entry = len(sensor.h)
+        whole_spread = {(a, b): variable.get() * scale_c + delta[a] * delta[b] * points.extra
+                        for (a, b), variable in spread.items()}  # fmt: skip
+        moved_cross: dict[tuple[int, int], Value] = {}
+        for (a, b), value in seen_spread(t, whole_spread, seen_from).items():
+            t.store("seen", first_entry + b * (b + 1) // 2 + a, value)
+        offset = first_entry + m * (m + 1) // 2
         for (i, a), variable in cross.items():
             value = variable.get() * scale_c
             if first:  # the weighted sum of deviations of x need not be 0
@@ -170,13 +173,19 @@ class Seeing:
                 value = value - whole * delta[a]
             elif around:
                 value = value - middle[i] * delta[a] * points.extra
-            t.store("seen", offset + i * m + a, value)
-        sizes = [("x", n, True), *([("middle", n, True)] if self.recalls and points.centre else []),
+            moved_cross[i, a] = value
+        for i in range(self.stride):
+            row = [moved_cross[i, a] for a in range(m)]
+            if seen_from is not None:
+                row = [t.value(linalg.dot(seen_from[a], row)) for a in range(m)]
+            for a, value in enumerate(row):
+                t.store("seen", offset + i * m + a, value)
+        sizes = [("x", numbers, True), *([("middle", n, True)] if self.recalls and points.centre else []),
                  ("cloud", len(points.rows) * self.stride, True), ("seen", self.size, False)]  # fmt: skip
         arrays = [Argument(name, "{name}_real_t", pointer=True, constant=c, size=s) for name, s, c in sizes]
-        body = schedule(t, taken | {"kf", "u", "x", "z", "middle", "cloud", "seen"})
+        body = schedule(t, taken | {"kf", "u", "x", "z", z.name, "middle", "cloud", "seen"})
         doc = f"what the points predict of {sensor.name}: mean, covariance, covariances with the state"
-        return cloud.private(f"{'recall' if self.recalls else 'see'}_{sensor.name}", body, arrays, doc)
+        return cloud.private(f"{'recall' if self.recalls else 'see'}_{sensor.name}", body, arrays, doc, sensor)
 
     # in the update -----------------------------------------------------------------------------------
 
@@ -190,7 +199,7 @@ class Seeing:
         for a, column in enumerate(columns):
             for place, value in zip(u.form.order, column, strict=True):
                 straight[place][a] = value
-        return Seen([p.value for p in linear.predicted], spread, straight, [])
+        return Seen(u.code.predicted(u.x), spread, straight, [])
 
     def draw(
         self, u: Update, P: Any, name: str = "", stored: bool = True
@@ -244,14 +253,13 @@ class Seeing:
 
     def read(self, t: Trace, seen: Array) -> Seen:
         """The numbers of the array."""
-        m = self.m
-        names = [c.name for c in self.sensor.spec.components]
-        z = [t.name(seen[a], f"h_{names[a]}") for a in range(m)]
+        m, components = self.m, self.sensor.spec.components
+        z = [t.name(seen[a], f"h_{c.name}") for a, c in enumerate(components)]
         made: dict[tuple[int, int], Value] = {}
         for b in range(m):
             for a in range(b + 1):
-                made[a, b] = seen[m + b * (b + 1) // 2 + a]
-        offset = m + m * (m + 1) // 2
+                made[a, b] = seen[len(components) + b * (b + 1) // 2 + a]
+        offset = len(components) + m * (m + 1) // 2
         cross = [[seen[offset + i * m + a] for a in range(m)] for i in range(self.stride)]
         return Seen(z, Symmetric(m, lambda a, b: made[a, b]), cross[: self.n], cross[self.n :])
 
@@ -260,7 +268,7 @@ class Seeing:
         t = u.t
         array, failures = self.draw(u, P, "_after", stored=False)
         guards.positive(t, failures)
-        local, seen = t.array("after", self.n), t.array("seen_after", self.size)
+        local, seen = t.array("after", len(x)), t.array("seen_after", self.size)
         for i, value in enumerate(x):
             local[i] = value
         self.run(u, seen, array, (local.name, 0))

@@ -15,7 +15,8 @@ from kfgen.filters.base import KF, Block
 from kfgen.filters.covariance.base import Form, Solving
 from kfgen.filters.covariance.kernels.function import Kernels
 from kfgen.filters.covariance.kernels.updates import absorb_one
-from kfgen.filters.kinds.ekf import Ekf, Learnt, Update
+from kfgen.filters.kinds.ekf import Ekf
+from kfgen.filters.kinds.work import Learnt, Update
 from kfgen.filters.sigma import cloud
 from kfgen.filters.sigma.carried import by_process, by_sensor, images_of_process
 from kfgen.filters.sigma.drawing import FROM, Drawing
@@ -45,7 +46,7 @@ class Ukf(Ekf):
         options = model.options.points
         assert options is not None
         self.points = options
-        self.n = len(model.states)
+        self.n = len(model.errors)
         self.keeps = not options.redraw
         self.own = options.kind == "custom"
         self.carried = () if self.own else by_process(model)
@@ -68,7 +69,7 @@ class Ukf(Ekf):
         plain = not self.keeps and not self.carried and self.set.exact and not model.options.rejects
         if not plain or any(b is not None for b in model.bounds):
             return False
-        if not all(part.flat for part in images_of_process(model)):
+        if any(not part.flat for _, _, part in images_of_process(model).singles):
             return False
         t = Trace()
         step = process.step_length(t, model)
@@ -97,7 +98,10 @@ class Ukf(Ekf):
     def private_functions(self, taken: frozenset[str]) -> list[Function]:
         made: list[Function] = []
         if not self.simple:
-            f = cloud.dynamics(self.model, self.carried, taken)
+            if self.model.rotations:
+                f = cloud.turning_dynamics(self.model, images_of_process(self.model), self.carried, taken)
+            else:
+                f = cloud.dynamics(self.model, self.carried, taken)
             made.append(f.function)
             absorb = None
             if self.loops and self.form.factored:
@@ -147,7 +151,7 @@ class Ukf(Ekf):
     def by_component(self, sensor: SensorModel) -> bool:
         """Whether components are taken one after another: as well as all at once where h is linear, but for options
         that judge the whole vector."""
-        several = len(sensor.h) > 1 and self.model.options.innovation_floor is not None
+        several = sensor.dimension > 1 and self.model.options.innovation_floor is not None
         return self.seeing[sensor.name].linear and not (self.model.spec.filter.adaptive is not None or several)
 
     def skipped(self, sensor: SensorModel) -> tuple[str, ...]:

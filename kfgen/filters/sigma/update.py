@@ -25,9 +25,11 @@ from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.covariance.motion import Moved
 from kfgen.filters.covariance.parts import Removal
 from kfgen.filters.frame import guards
-from kfgen.filters.kinds.ekf import Ekf, Update
+from kfgen.filters.kinds.ekf import Ekf
+from kfgen.filters.kinds.work import Update
 from kfgen.filters.sigma.innovation import Factored, Trust, factored, known_squares, pivots
-from kfgen.filters.sigma.seeing import Seeing, Seen
+from kfgen.filters.sigma.seeing import Seeing
+from kfgen.filters.sigma.turned import Seen
 from kfgen.filters.steps.gate import chi2_threshold
 from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.sensor import Linearised, SensorCode, decorrelated, masked
@@ -43,6 +45,7 @@ def whole_vector(
     model, form = ukf.model, ukf.form
     t.section("innovation")
     code = SensorCode(t, model, sensor, ukf.order, skipped=seeing.carried)
+    code.counts = used
     u = Update(t, sensor, code, code.prior(), form, used, ukf.adapted_R(sensor))
     failures: list[Value] = []
     array = out = None
@@ -89,6 +92,8 @@ def whole_vector(
         P, doubtful = form.bounded(t, P, prior, final.share, seeing.tolerance)
     t.section("state")
     x = ukf.moved(u, motion)
+    if u.turns:
+        P = ukf.reset(u, P)
     evidence = ukf.unconfined(x) + form.evidence(P, after_predict=final is not first)
     P = ukf.limited(t, P)
     x = ukf.state.confined(t, x)
@@ -125,7 +130,7 @@ class _Whole:
         if u.adapted is None and any(r.constant is None for row in self.R for r in row):
             for d in decorrelated(u.t, linear, self.R).variances:
                 require_nonnegative(d, "R is not positive semidefinite")
-                ukf.suppose(d)
+                ukf.suppose(u.sensor, d)
         diagonal = all(is_zero(self.R[i][j]) for i in range(m) for j in range(m) if i != j)
         self.definite = seeing.points.positive and seeing.points.exact
         self.exact = any(is_zero(r) for r in pivots(self.R, 8 * m * ukf.scalar.epsilon))  # without noise
@@ -160,7 +165,7 @@ class _Whole:
                 if made:
                     t.flag(low, "REGULARIZED")
                 S[i][i] = select(low, t.value(floor), S[i][i])
-        names = [c.name for c in self.seeing.sensor.spec.components]
+        names = list(self.seeing.sensor.errors)
         epsilon = self.ukf.scalar.epsilon
         noise = [t.value(0) if self.sure else self._rounding(a, seen) for a in range(m)]
         trust = Trust(self.sure, self.definite, 8 * epsilon, noise)
@@ -175,11 +180,15 @@ class _Whole:
             terms = [dense[i, i] * (slope * slope) for i, slope in enumerate(h) if not is_zero(slope)]
             return u.t.value(sum(terms) * (8 * self.seeing.n * epsilon))
         # points differ from each other by the rounding of what h adds up, if by nothing else
-        size: Value = seen.z[a] if not self.exact else u.t.function("abs", seen.z[a])
+        component = self.seeing.sensor.space.numbers_of[a]
+        size: Value = u.t.one if component is None else seen.z[component]
+        size = size if not self.exact else u.t.function("abs", size)
         if self.exact:
             for place, slope in zip(self.ukf.order, h, strict=True):
+                number = u.code.model.space.numbers_of[place]
                 if not is_zero(slope):
-                    size = size + u.t.function("abs", u.x[place] * slope)
+                    reach = slope if number is None else u.x[number] * slope
+                    size = size + u.t.function("abs", reach)
         return size * size * (sum(abs(w) for w in points.wc) * (32 * epsilon) ** 2)
 
     def inflated(

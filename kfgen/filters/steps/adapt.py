@@ -37,9 +37,9 @@ class AdaptedR:
     def __init__(self, model: Model, sensor: SensorModel, factored: bool, epsilon: Fraction) -> None:
         assert model.options.adapt_R is not None
         self.rate = model.options.adapt_R
-        self.m = len(sensor.h)
+        self.m = sensor.dimension
         self.residual_field = f"residual_{sensor.name}"
-        names = [c.name for c in sensor.spec.components]
+        names = list(sensor.errors)
         start, doc = _constants(model, sensor.R), f"R of {sensor.name}, adapted"
         self.kept = Kept(f"R_{sensor.name}", start, factored, doc, names)
         self.smallest = self.m * epsilon
@@ -94,7 +94,7 @@ class AdaptedQ:
         assert model.options.adapt_Q is not None
         self.rate = model.options.adapt_Q
         Q = _constants(model, model.Q)
-        doc, names = "additive process noise, adapted", [model.states[i] for i in order]
+        doc, names = "additive process noise, adapted", [model.errors[i] for i in order]
         self.kept = Kept("Q", [[Q[i][j] for j in order] for i in order], factored, doc, names)
         self.smallest = len(order) * epsilon
 

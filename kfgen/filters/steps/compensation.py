@@ -13,7 +13,7 @@ from fractions import Fraction
 from kfgen.filters.algebra.linalg import Vector, minus, plus, times
 from kfgen.filters.algebra.numbers import is_zero, select
 from kfgen.filters.base import Block
-from kfgen.filters.steps.process import compensated
+from kfgen.filters.steps.motion import compensated
 from kfgen.filters.steps.sensor import Linearised
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model

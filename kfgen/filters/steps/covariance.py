@@ -33,7 +33,7 @@ class CovarianceCode:
     def blocks(self) -> tuple[Block, ...]:
         """The fields that hold it, at P0."""
         P0 = self.model.P0
-        names = [self.model.states[i] for i in self.order]
+        names = [self.model.errors[i] for i in self.order]
         return tuple(self.form.named(self.form.blocks([[P0[i][j] for j in self.order] for i in self.order], names)))
 
     def functions(self, taken: frozenset[str]) -> list[Function]:

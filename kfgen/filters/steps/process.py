@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from fractions import Fraction
 
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.dual import Dual, Evaluator, seeds
+from kfgen.filters.algebra.dual import Dual, Evaluator, seeds, state_seeds
 from kfgen.filters.algebra.exact import discretise
 from kfgen.filters.algebra.factors import udu
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_positive, is_zero, require_nonnegative
+from kfgen.filters.steps.isotropic import separated, turned_back
+from kfgen.filters.steps.motion import compensated, errors_of, integrate, rates_of_errors, stepped
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
+from kfgen.model.model import SensorModel
 from kfgen.spec import constants
 
 NEGATIVE = "a noise variance is negative"
-
-
-def compensated(model: Model) -> tuple[int, ...]:
-    """The states whose rounding is carried on: see `compensation`."""
-    return tuple(i for i, name in enumerate(model.states) if name in model.spec.code.compensated)
 
 
 @dataclass(frozen=True)
@@ -41,10 +38,11 @@ class Prior:
 
 @dataclass(frozen=True)
 class Advance:
-    """x (n), F (n, n), Q (n, n) and the noise columns (w, d): P <- F P F^T + Q + sum d w w^T. Spec's order.
+    """x (of all states), F (n, n), Q (n, n) and the noise columns (w, d) of their n errors: P <- F P F^T + Q + sum of
+    d w w^T. Spec's order.
 
-    after: x with its derivatives. added: what of Q comes from noise densities. steps: by what x moves, of those states
-    of which that is asked for.
+    errors: of x, with their derivatives. after: x with its derivatives. added: what of Q comes from noise densities.
+    steps: by what x moves, of those states of which that is asked for.
     """
 
     x: list[Value]
@@ -52,6 +50,7 @@ class Advance:
     Q: Rows
     noise: list[tuple[Vector, Value]]
     after: list[Dual]
+    errors: list[Dual]
     added: Rows | None = None
     steps: dict[int, Value] = field(default_factory=dict)
 
@@ -81,19 +80,25 @@ def step_length(t: Trace, model: Model) -> Step:
     return Step(step, raw)
 
 
-def parameters_and_inputs(t: Trace, model: Model, inputs: bool = True) -> dict[str, Dual]:
+def parameters_and_inputs(
+    t: Trace, model: Model, inputs: bool = True, sensor: SensorModel | None = None
+) -> dict[str, Dual]:
+    """What a caller sets. sensor: the one whose own inputs come too."""
     out = {name: Dual(t.field(f"kf.parameters.{name}")) for name, _ in model.parameters}
     if inputs:
         out.update({name: Dual(t.field(f"u.{name}")) for name in model.inputs})
+    if sensor is not None:
+        out.update({name: Dual(t.field(f"z.{name}")) for name in sensor.inputs})
     return out
 
 
-def declared_signs(model: Model) -> dict[str, int]:
-    """The signs of inputs and parameters whose declared range excludes 0, by their paths."""
+def declared_signs(model: Model, sensor: SensorModel | None = None) -> dict[str, int]:
+    """The signs of inputs and parameters whose declared range excludes 0, by their paths; those of a sensor's too."""
     found: dict[str, int] = {}
     spec = model.spec
     given = [(f"u.{i.name}", i.range) for i in spec.inputs]
     given += [(f"kf.parameters.{p.name}", p.range) for p in spec.parameters]
+    given += [] if sensor is None else [(f"z.{i.name}", i.range) for i in sensor.spec.inputs]
     for path, limits in given:
         if limits is not None:
             low, high = (float(constants.value(limit.tree, spec)) for limit in limits)
@@ -113,7 +118,7 @@ def time_now(t: Trace, model: Model) -> Dual:
 def given(t: Trace, model: Model, step: Step) -> Prior:
     """Values and seeds of all that f may use; noises are at their mean, 0."""
     x = [t.element("kf.x", i) for i in range(len(model.states))]
-    duals = seeds(t, dict(zip(model.states, x, strict=True)))
+    duals = state_seeds(t, model, x)
     used = model.uses(*model.dynamics_expressions())
     for name, value in zip(model.states, x, strict=True):
         if name in used:
@@ -135,7 +140,7 @@ def advance(
 
     derivatives: 2 has `after` carry second derivatives too. carried: noise inputs that are accounted for otherwise.
     """
-    n = len(model.states)
+    n = len(model.errors)
     at_prior = Evaluator(t, model, prior.duals, derivatives)
     Q = [[at_prior.value(e) for e in row] for row in model.Q] if additive is None else additive
     added: Rows | None = None
@@ -144,7 +149,7 @@ def advance(
     extra: list[tuple[Vector, Value]] = []
     Qw = [[at_prior.value(e) for e in row] for row in model.noise_covariance]
     if model.spec.dynamics.form == "discrete":
-        after = [at_prior(e) for e in model.f]
+        after = stepped(t, model, at_prior)
         steps = {i: at_prior.value(model.f[i] - model.symbols[model.states[i]]) for i in compensated(model)}
     else:
         assert step.dt is not None
@@ -156,27 +161,27 @@ def advance(
             added, extra = linear.noise(t, at_prior, [[Qw[i][j] for j in index] for i in index], step.dt)
             Q = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(Q, added, strict=True)]
         else:
-            after, moved_by = _integrate(t, model, prior, step.dt, held, derivatives)
+            after, moved_by = integrate(t, model, prior.duals, step.dt, held, derivatives)
             steps = {i: moved_by[i].value for i in compensated(model)}
-            rates = [at_prior(e) for e in model.f]
-            extra = _columns(t, model, rates, dense, Qw, step.dt)
-    F = [[d.gradient.get(name, t.zero) for name in model.states] for d in after]
-    noise = _columns(t, model, after, [w for w in held if w not in carried], Qw, None) + extra
+            extra = _columns(t, model, rates_of_errors(model, at_prior), dense, Qw, step.dt)
+    errors = errors_of(model, after)
+    F = [[d.gradient.get(name, t.zero) for name in model.errors] for d in errors]
+    noise = _columns(t, model, errors, [w for w in held if w not in carried], Qw, None) + extra
     assert len(F) == n
-    return Advance([d.value for d in after], F, Q, noise, after, added, steps)
+    if model.rotations:
+        Q, noise = separated(Q, turned_back(t, noise, at_prior.attitudes.values()))
+    return Advance([d.value for d in after], F, Q, noise, after, errors, added, steps)
 
 
 def moved(t: Trace, model: Model, duals: dict[str, Dual], dt: Value | None) -> list[Value]:
     """x after a step from given values of all that f uses, noise inputs included."""
-    prior = Prior([duals[name].value for name in model.states], duals)
     if model.spec.dynamics.form == "discrete":
-        evaluator = Evaluator(t, model, duals)
-        return [evaluator.value(e) for e in model.f]
+        return [d.value for d in stepped(t, model, Evaluator(t, model, duals))]
     assert dt is not None
     if model.spec.dynamics.integrator == "exact":
         after = discretise(model).advance(t, Evaluator(t, model, duals), duals, dt)
     else:
-        after, _ = _integrate(t, model, prior, dt, [w.name for w in model.noises if not w.density], 1)
+        after, _ = integrate(t, model, duals, dt, [w.name for w in model.noises if not w.density], 1)
     return [d.value for d in after]
 
 
@@ -208,49 +213,6 @@ def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Ro
             require_nonnegative(weight, NEGATIVE)
             columns.append((column, weight if dt is None else weight * dt))
     return columns
-
-
-def _integrate(
-    t: Trace, model: Model, prior: Prior, dt: Value, held: list[str], derivatives: int
-) -> tuple[list[Dual], list[Dual]]:
-    """euler, midpoint or rk4 with substeps; t, dt, inputs and noises are held over the step. Where x is then, and by
-    what it has moved.
-
-    Derivatives are carried through the stages, so F and G are those of the integrator itself.
-    """
-    dynamics = model.spec.dynamics
-    h = dt * Fraction(1, dynamics.substeps)
-    constant = {name: d for name, d in prior.duals.items() if name not in model.states}
-    for w in model.noises:
-        if w.name not in held:
-            constant[w.name] = Dual(t.zero)
-    moving = [i for i, e in enumerate(model.f) if e != 0]
-
-    def rate(x: list[Dual]) -> list[Dual]:
-        evaluator = Evaluator(t, model, {**constant, **dict(zip(model.states, x, strict=True))}, derivatives)
-        return [evaluator(e) for e in model.f]
-
-    def shifted(x: list[Dual], k: list[Dual], length: Value) -> list[Dual]:
-        return [a + b.scaled(length) if i in moving else a for i, (a, b) in enumerate(zip(x, k, strict=True))]
-
-    x = [prior.duals[name] for name in model.states]
-    whole = [Dual(t.zero) for _ in x]
-    for _ in range(dynamics.substeps):
-        k1 = rate(x)
-        if dynamics.integrator == "euler":
-            k, part = k1, h
-        elif dynamics.integrator == "midpoint":
-            k, part = rate(shifted(x, k1, h * Fraction(1, 2))), h
-        else:
-            k2 = rate(shifted(x, k1, h * Fraction(1, 2)))
-            k3 = rate(shifted(x, k2, h * Fraction(1, 2)))
-            k4 = rate(shifted(x, k3, h))
-            k = [a + (b + c).scaled(2) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
-            part = h * Fraction(1, 6)
-        x = shifted(x, k, part)
-        if compensated(model):
-            whole = shifted(whole, k, part)
-    return x, whole
 
 
 def store_time(t: Trace, model: Model, step: Step) -> None:

@@ -15,7 +15,7 @@ CARRIED = 16  # bits below the LSB that a carried cell has
 
 def carry(code: FilterCode, formats: Formats, pace: Pace) -> None:
     """Find the cells of one filter that change by less than can be rounded away."""
-    arrays, states = formats.arrays, code.model.states
+    arrays, states, errors = formats.arrays, code.model.states, code.model.errors
 
     def mark(cell: Cell, name: str) -> None:
         if chained(code.functions, arrays, cell):
@@ -26,14 +26,15 @@ def carry(code: FilterCode, formats: Formats, pace: Pace) -> None:
 
     for i in range(len(states)):
         cell = arrays.state(i)
-        if pace.drifts(i, math.ldexp(1.0, formats.fixed[cell])):
+        error = code.model.space.errors_of[i]
+        if error is not None and pace.drifts(error, math.ldexp(1.0, formats.fixed[cell])):
             mark(cell, states[i])
     if not pace.moved:
         return
     name = "D" if "kf.D" in pace.moved else "P"
     slow: set[int] = set()
     for diagonal in (True, False) if name == "P" else (True,):  # beside a slow variance, correlations may be slow
-        for j in range(len(states)):
+        for j in range(len(errors)):
             for i in (j,) if diagonal else range(j):
                 index = j if name == "D" else packed(i, j)
                 cell = arrays.element(("array", f"kf.{name}"), index)
@@ -42,4 +43,4 @@ def carry(code: FilterCode, formats: Formats, pace: Pace) -> None:
                     continue
                 if pace.crawls(f"kf.{name}", index, code.order[j] if diagonal else None, math.ldexp(1.0, e)):
                     slow |= {j} if diagonal else set()
-                    mark(cell, f"{name}[{states[code.order[j]]}]" if diagonal else "")
+                    mark(cell, f"{name}[{errors[code.order[j]]}]" if diagonal else "")

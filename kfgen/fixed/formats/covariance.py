@@ -23,7 +23,7 @@ def covariances(code: FilterCode, formats: Formats, noise: list[list[float]]) ->
 
 def _covariance(code: FilterCode, f: Formats, place: str, order: tuple[int, ...], noises: list[float]) -> None:
     """P_ij at the mean of P_ii and P_jj, which bound it. place: of the filter in the struct."""
-    states = code.model.states
+    states = code.model.errors
     n = len(states)
     names = {block.name for block in code.blocks}
     fields = {name for name in ("D", "P", "S") if place + name in names}

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from kfgen.filters.base import FilterCode
+from kfgen.filters.steps.outputs import FUNCTION, VALUE
 from kfgen.fixed.formats.formats import Formats
+from kfgen.fixed.formats.interface import error_cell
 from kfgen.model import Model
 
 
@@ -11,12 +13,16 @@ def units(code: FilterCode, formats: Formats) -> tuple[tuple[str, int], ...]:
     """Name of what the user reads or writes -> the exponent of the value of raw 1."""
     spec = code.model.spec
     out = [(s.name, formats.arrays.state(i)) for i, s in enumerate(spec.states)]
+    out += [(name, error_cell(name)) for r in spec.rotations for name in r.errors]
     out += [(each.name, ("number", f"u.{each.name}")) for each in spec.inputs]
     out += [(each.name, ("number", f"kf.parameters.{each.name}")) for each in spec.parameters]
     out += [
         (f"{s.name}_{c.name}", ("number", f"update_{s.name}", f"z.{c.name}"))
-        for s in spec.measurements for c in s.components
+        for s in spec.measurements for c in s.fields
     ]  # fmt: skip
+    out += [(f"{s.name}_{e}", error_cell(f"{s.name}.{e}")) for s in spec.measurements for r in s.rotations
+            for e in r.errors]  # fmt: skip
+    out += [(output.name, ("number", FUNCTION, f"{VALUE}.{output.name}")) for output in spec.outputs]
     if spec.dt is not None and spec.dt.run_time:
         out.append(("dt", ("number", "dt")))
     return tuple((name.upper(), formats.fixed[cell]) for name, cell in out)

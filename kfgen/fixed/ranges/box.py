@@ -16,11 +16,12 @@ Span = tuple[float, float]
 class Box:
     """Low and high of each quantity; None (and no entry) where nothing is declared.
 
-    states (n): their bounds or ranges, or half a period to each side. readings: (sensor, component) -> its range.
-    dt: of a step that is given at run time, from its least to its greatest.
+    states (n): their bounds or ranges, or half a period to each side. readings: (sensor, component or input of its
+    own) -> its range. dt: of a step that is given at run time, from its least to its greatest.
     """
 
     states: tuple[Span | None, ...]
+    numbers: tuple[int | None, ...]  # error coordinate -> its state; None for those of a quaternion
     inputs: dict[str, Span]
     parameters: dict[str, Span]
     readings: dict[tuple[str, str], Span]
@@ -70,11 +71,12 @@ def box_of(model: Model) -> Box:
     low, high = model.dt_limits
     return Box(
         states=tuple(states),
+        numbers=model.space.numbers_of,
         inputs={each.name: limits(each.range, spec) for each in spec.inputs if each.range is not None},
         parameters=parameters,
         readings={
             (s.name, c.name): limits(c.range, spec)
-            for s in spec.measurements for c in s.components if c.range is not None
+            for s in spec.measurements for c in s.fields if c.range is not None
         },
         dt=_steps(low, high, model),
     )  # fmt: skip

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from kfgen.fixed.ranges.box import Box, clipped
+from kfgen.fixed.ranges.box import Box, Span, clipped
 from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.legs import LEGS, Leg, at, legs
 from kfgen.fixed.ranges.weather import Weather
@@ -74,7 +74,7 @@ class Drive:
         player.begin(leg.fresh, leg.parameters)
         truth.begin(random)
         truth.memory.numbers.update({f"kf.parameters.{name}": value for name, value in leg.parameters.items()})
-        off = [a - float(b) for a, b in zip(truth.x, self.model.x0, strict=True)] if leg.fresh else [0.0] * n
+        off = [a - float(b) for a, b in zip(truth.x, self.model.x0, strict=True)] if leg.fresh else [0.0] * truth.nx
         truth.place(leg.x, [0.0] * n)
         self._place(player, [a + e for a, e in zip(leg.x, off, strict=True)])
         mode = k % self.weather.modes
@@ -96,16 +96,16 @@ class Drive:
             end = DARK * rows + BLINK if leg.corner else rows - 2  # at the ends of everything variances grow fast
             dark = leg.dark and DARK * rows <= row < end
             sensors = () if dark else self.model.sensors
-            readings = {s.name: self._reading(mode, i, random) for i, s in enumerate(sensors)}
+            readings = {s.name: self._reading(leg, row, mode, i, random) for i, s in enumerate(sensors)}
             if not player.row(inputs, dt, readings, row):
                 return
             self._note(leg, inputs, dt)
 
     def _place(self, player: Player, x: Sequence[float]) -> None:
-        player.place([
-            part.placed(self.box.inside(i, a) if part.flat else a)
-            for i, (a, part) in enumerate(zip(x, self.model.parts, strict=True))
-        ])  # fmt: skip
+        inside = list(x)
+        for i, _, part in self.model.space.singles:
+            inside[i] = self.box.inside(i, x[i]) if part.flat else x[i]
+        player.place(self.model.space.placed(inside))
 
     def _stepped(self, mode: int, inputs: dict[str, float], dt: float, random: Random) -> bool:
         """A step of the truth; False where it leaves the numbers."""
@@ -122,15 +122,17 @@ class Drive:
 
     def _inputs(self, leg: Leg, row: int, random: Random) -> dict[str, float]:
         """At the ends of their ranges by turns, or about a place in them."""
-        out = {}
-        for i, name in enumerate(self.model.inputs):
-            span, place = self.box.inputs.get(name), leg.places[f"u.{name}"]
-            if leg.corner:
-                place = place if row // (HELD + 5 * i) % 2 == 0 else 1.0 - place
-            else:
-                place += 0.1 * (2 * random.random() - 1)
-            out[name] = at((-1.0, 1.0) if span is None else span, place)
-        return out
+        spans = [(name, self.box.inputs.get(name), f"u.{name}") for name in self.model.inputs]
+        return {name: self._input(leg, row, i, span, key, random) for i, (name, span, key) in enumerate(spans)}
+
+    def _input(self, leg: Leg, row: int, i: int, span: Span | None, key: str, random: Random) -> float:
+        """The i-th of some inputs, its place in the leg under a key."""
+        place = leg.places[key]
+        if leg.corner:
+            place = place if row // (HELD + 5 * i) % 2 == 0 else 1.0 - place
+        else:
+            place += 0.1 * (2 * random.random() - 1)
+        return at((-1.0, 1.0) if span is None else span, place)
 
     def _dt(self, leg: Leg, row: int, random: Random) -> float:
         weather, span = self.weather, self.box.dt
@@ -142,9 +144,12 @@ class Drive:
             return span[int(leg.places["dt"] < 0.5) if row // HELD % 3 == 2 else int(leg.places["dt"] >= 0.5)]
         return at(span, random.random() ** 2) if row % 3 else weather.nominal
 
-    def _reading(self, mode: int, k: int, random: Random) -> list[float]:
-        sensor = self.model.sensors[k]
-        return [
-            clipped(z, self.box.readings.get((sensor.name, c.name)))
-            for z, c in zip(self.truth.see(mode, k, random), sensor.spec.components, strict=True)
+    def _reading(self, leg: Leg, row: int, mode: int, k: int, random: Random) -> list[float]:
+        sensor, spans = self.model.sensors[k], self.box.readings
+        given = [
+            self._input(leg, row, i, spans.get((sensor.name, name)), f"z.{sensor.name}.{name}", random)
+            for i, name in enumerate(sensor.inputs)
         ]
+        seen = self.truth.see(mode, k, random, given)
+        names = [c.name for c in sensor.spec.components]
+        return [*(clipped(z, spans.get((sensor.name, name))) for z, name in zip(seen, names, strict=True)), *given]

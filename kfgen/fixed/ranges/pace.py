@@ -62,7 +62,7 @@ class Pace:
                 self.moved.setdefault(name, []).append(changes)
 
     def _variances(self, memory: Memory) -> list[float]:
-        return self.program.variances(memory, len(self.code.model.states))
+        return self.program.variances(memory, len(self.code.model.errors))
 
     def typical(self) -> list[float]:
         """The variances of the run; none where they were not looked at."""

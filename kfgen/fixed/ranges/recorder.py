@@ -63,4 +63,5 @@ def within(box: Box, x: Sequence[float], limits: Sequence[float], variances: Cal
 
 def unknown(box: Box) -> list[float]:
     """Variances (n) at which a state is as good as unknown: a deviation of half its span."""
-    return [math.inf if span is None else ((span[1] - span[0]) / 2) ** 2 for span in box.states]
+    spans = [None if i is None else box.states[i] for i in box.numbers]
+    return [math.inf if span is None else ((span[1] - span[0]) / 2) ** 2 for span in spans]

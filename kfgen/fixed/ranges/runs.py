@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from kfgen.filters.base import FilterCode
+from kfgen.filters.steps.outputs import FUNCTION
 from kfgen.fixed.ranges.memory import Memory, blank
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
+from kfgen.spec.sensors import columns_of
 from kfgen.spec.types import Sensor
 
 Columns = Mapping[str, Sequence[float]]
@@ -25,8 +27,8 @@ def elapsed(log: Columns, k: int) -> float:
 
 
 def readings(log: Columns, sensor: Sensor, k: int) -> list[float]:
-    """What a sensor's components read in row k; NaN where nothing was."""
-    columns = [log.get(f"{sensor.name}.{c.name}") for c in sensor.components]
+    """What a sensor's components read in row k, and its own inputs; NaN where nothing was."""
+    columns = [log.get(name) for name in columns_of(sensor)]
     return [math.nan if column is None else float(column[k]) for column in columns]
 
 
@@ -72,6 +74,7 @@ class Runner:
             for place, sensor in enumerate(self.spec.measurements):
                 if (k + place) % every == 0:
                     self._limited(memory, sensor, readings(log, sensor, k), k)
+            self._tell(memory)
             if every > 1 and rows - 2 * OUTAGE < 2 * k <= rows:
                 found = self.variances(memory)
                 least = [min(pair) for pair in zip(least or found, found, strict=True)]
@@ -93,6 +96,7 @@ class Runner:
         for sensor in self.spec.measurements:
             if sensor.name in readings:
                 self._limited(memory, sensor, readings[sensor.name], k)
+        self._tell(memory)
         if k % EVERY == 0:
             self._others(memory, k)
 
@@ -105,7 +109,7 @@ class Runner:
     def _correlate(self, memory: Memory, correlation: float) -> None:
         if "set_covariance" not in self.names:
             return
-        n = len(self.code.model.states)
+        n = len(self.code.model.errors)
         self.program.run("get_covariance", memory)
         P = memory.arrays["P"]
         root = [math.sqrt(max(P[i * n + i], 0.0)) for i in range(n)]
@@ -134,7 +138,7 @@ class Runner:
 
     def variances(self, memory: Memory) -> list[float]:
         """P_ii (n); 0 where the filter does not say."""
-        n = len(self.code.model.states)
+        n = len(self.code.model.errors)
         return self.program.variances(memory, n) if "get_covariance" in self.names else [0.0] * n
 
     def rescale(self, memory: Memory, factors: Sequence[float]) -> None:
@@ -161,19 +165,19 @@ class Runner:
         return step != 0
 
     def _update(self, memory: Memory, sensor: Sensor, values: Sequence[float], k: int) -> None:
-        there = [not math.isnan(v) for v in values]
-        if not any(there):
+        there = [not math.isnan(v) for v in values[: len(sensor.components)]]
+        if not any(there) or any(map(math.isnan, values[len(there) :])):
             return
         self.heard.add(sensor.name)
         name = f"update_{sensor.name}"
-        for c, v, known in zip(sensor.components, values, there, strict=True):
-            memory.numbers[f"z.{c.name}"] = v if known else 0.0
-            if known:
+        for c, v in zip(sensor.fields, values, strict=True):
+            memory.numbers[f"z.{c.name}"] = 0.0 if math.isnan(v) else v
+            if not math.isnan(v):
                 self.ranges.see(("number", name, f"z.{c.name}"), v)
         if all(there):
             if sensor.partial:
                 other = memory.copy()
-                other.numbers["mask"] = 1 + k % ((1 << len(values)) - 1)
+                other.numbers["mask"] = 1 + k % ((1 << len(there)) - 1)
                 self.program.run(f"{name}_masked", other)
             self.program.run(name, memory)
         elif sensor.partial:
@@ -193,6 +197,11 @@ class Runner:
             for i, value in enumerate(memory.arrays[f"kf.{block.name}"]):
                 self.ranges.see(self.program.arrays.element(key, i), value)
 
+    def _tell(self, memory: Memory) -> None:
+        """The outputs, where there are some."""
+        if FUNCTION in self.names:
+            self.program.run(FUNCTION, memory)
+
     def _others(self, memory: Memory, k: int) -> None:
         """Covariance and state out and in again, on copies."""
         other = memory.copy()
@@ -200,7 +209,7 @@ class Runner:
             self.program.run("get_covariance", other)
         if "set_covariance" in self.names:
             P = list(other.arrays["P"])
-            n = len(self.code.model.states)
+            n = len(self.code.model.errors)
             for part in (P, [p if i % (n + 1) == 0 else 0.5 * p for i, p in enumerate(P)]):
                 other.arrays["P"] = list(part)
                 self.program.run("set_covariance", other)

@@ -31,7 +31,7 @@ class Truth:
         self.model = model = code.model
         self.models = [mode.model for mode in code.modes] or [model]
         self.box = box
-        self.n = len(model.states)
+        self.nx, self.n = len(model.states), len(model.errors)
         self.run_time = model.spec.dt is not None and model.spec.dt.run_time
         functions = []
         for b, mode in enumerate(self.models):
@@ -40,15 +40,16 @@ class Truth:
         self.last = [0.0] * self.n**2  # Q of the last step
         self.memory = Memory()
         self.now = 0.0
-        self.parts = model.parts
-        self.cut = [0.0] * self.n  # by how much the last step would have left the box
+        self.space = model.space
+        self.cut = [0.0] * self.nx  # by how much the last step would have left the box
 
     def _step(self, model: Model, b: int) -> Function:
         t, n = Trace(), self.n
         step = Step(t.field("dt") if self.run_time else None if model.dt is None else t.value(model.dt))
         result = process.advance(t, model, process.given(t, model, step), step)
+        for i, value in enumerate(result.x):
+            t.store("out.x", i, value)
         for i in range(n):
-            t.store("out.x", i, result.x[i])
             for j in range(n):
                 total_ = result.Q[i][j]
                 for w, d in result.noise:
@@ -61,9 +62,10 @@ class Truth:
         sensor = model.sensors[k]
         code = SensorCode(t, model, sensor, list(range(self.n)))
         linear = code.linearise(code.prior())
-        R, m = total(linear), len(sensor.h)
+        R, m = total(linear), sensor.dimension
+        for i, value in enumerate(code.predicted(code.prior())):
+            t.store("out.z", i, value)
         for i in range(m):
-            t.store("out.z", i, linear.predicted[i].value)
             for j in range(m):
                 t.store("out.R", i * m + j, t.value(R[i][j]))
         return Function(f"see_{b}_{k}", [], schedule(t), "", returns="void")
@@ -75,7 +77,10 @@ class Truth:
     def begin(self, random: Random) -> None:
         """At a draw of the first estimate, with the spec's parameters, at time 0."""
         model, n = self.model, self.n
-        self.memory = Memory({"kf.x": [], "out.x": [0.0] * n, "out.Q": [0.0] * n * n}, {"kf.steps": 0, "kf.t": 0.0})
+        arrays = {"kf.x": [], "out.x": [0.0] * self.nx, "out.Q": [0.0] * n * n}
+        self.memory = Memory(arrays, {"kf.steps": 0, "kf.t": 0.0})
+        for sensor in model.sensors:  # of a quaternion that is tested, though what is measured is yet to be drawn
+            self.memory.numbers |= {f"z.{part}": 1.0 for r in sensor.rotations for part in r.parts}
         self.now = 0.0
         for name, number in model.parameters:
             self.memory.numbers[f"kf.parameters.{name}"] = float(number)
@@ -83,13 +88,17 @@ class Truth:
         self.place([float(v) for v in model.x0], draw(P0, random))
 
     def place(self, x: Sequence[float], noise: Sequence[float]) -> None:
-        """Put the truth at x + noise, both (n), or as near to it as the box allows."""
-        inside, wanted = [], []
-        for i, (a, e, part) in enumerate(zip(x, noise, self.parts, strict=True)):
-            wanted.append(a + e)
-            inside.append(self.box.inside(i, a + e) if part.flat else a + e)
+        """Put the truth at x [+] noise, or as near to it as the box allows."""
+        wanted = list(x)
+        for i, j, _ in self.space.singles:
+            wanted[i] = x[i] + noise[j]
+        for i, j, rotation in self.space.rotations:
+            wanted[i : i + 4] = rotation.retract(x[i : i + 4], noise[j : j + 3])
+        inside = list(wanted)
+        for i, _, part in self.space.singles:
+            inside[i] = self.box.inside(i, wanted[i]) if part.flat else wanted[i]
         self.cut = [a - b for a, b in zip(wanted, inside, strict=True)]
-        self.memory.arrays["kf.x"] = [part.placed(a) for a, part in zip(inside, self.parts, strict=True)]
+        self.memory.arrays["kf.x"] = self.space.placed(inside)
 
     def step(self, mode: int, dt: float, random: Random) -> bool:
         """One step; False where the model leaves the numbers, and the truth stays where it is."""
@@ -107,16 +116,22 @@ class Truth:
         memory.numbers["kf.steps"] += 1
         return True
 
-    def see(self, mode: int, k: int, random: Random) -> list[float]:
-        """A reading of sensor k."""
+    def see(self, mode: int, k: int, random: Random, given: Sequence[float] = ()) -> list[float]:
+        """A reading of sensor k (m,). given: the sensor's own inputs."""
         sensor = self.model.sensors[k]
-        m = len(sensor.h)
+        self.memory.numbers.update({f"z.{name}": value for name, value in zip(sensor.inputs, given, strict=True)})
+        m = sensor.dimension
         arrays = self.memory.arrays
-        arrays["out.z"], arrays["out.R"] = [0.0] * m, [0.0] * (m * m)
+        arrays["out.z"], arrays["out.R"] = [0.0] * len(sensor.h), [0.0] * (m * m)
         self.program.run(f"see_{mode}_{k}", self.memory)
         flat = arrays["out.R"]
         noise = draw([flat[r * m : r * m + m] for r in range(m)], random)
-        return [part.placed(z + e) for z, e, part in zip(arrays["out.z"], noise, sensor.parts, strict=True)]
+        z = list(arrays["out.z"])
+        for i, j, part in sensor.space.singles:
+            z[i] = part.placed(z[i] + noise[j])
+        for i, j, rotation in sensor.space.rotations:
+            z[i : i + 4] = rotation.retract(rotation.normalised(z[i : i + 4]), noise[j : j + 3])
+        return z
 
 
 def draw(P: list[list[float]], random: Random) -> list[float]:

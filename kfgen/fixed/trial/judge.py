@@ -93,7 +93,8 @@ def _missing(sigmas: float) -> int:
 
 def _carrying(formats: Formats, i: int, real: FilterCode, scalar: Fixed) -> str:
     states = real.model.spec.states
-    largest, least = _spread(formats, i, len(states))
+    error = real.model.space.errors_of[i] or 0
+    largest, least = _spread(formats, error, len(real.model.errors))
     what = f"{scalar.name} cannot carry `{states[i].name}`"
     return f"{what}: its standard deviation goes from {largest:.3g} to {least:.3g}" if least > 0 else what
 

@@ -79,7 +79,7 @@ class Probe:
 
     def read(self, sensor: Sensor, values: Sequence[float]) -> None:
         """Give a reading."""
-        for c, v in zip(sensor.components, values, strict=True):
+        for c, v in zip(sensor.fields, values, strict=True):
             self.give(("number", f"update_{sensor.name}", f"z.{c.name}"), f"z.{c.name}", v)
 
     def call(self, function: str) -> None:
@@ -139,16 +139,19 @@ class Probe:
 
     def error(self) -> tuple[int, float]:
         """The largest error of a state, in standard deviations, and of which."""
-        n = len(self.code.model.states)
+        space = self.code.model.space
+        n = space.dimension
         variances = [math.inf] * n
         if any(f.name == "get_covariance" for f in self.code.functions):
             self.real.run("get_covariance", self.a)
             variances = [self.a.arrays["P"][i * n + i] for i in range(n)]
         worst = (0, 0.0)
-        for i in range(n):
-            error = abs(self.code.model.parts[i].local(self.a.arrays["kf.x"][i], self.value(i)))
-            error = max(0.0, error - math.ldexp(4.0, self._lsb(i)))
-            sigma = math.sqrt(max(variances[i], 0.0))
+        apart = space.local(self.a.arrays["kf.x"], [self.value(i) for i in range(space.size)])
+        for j, i in enumerate(space.numbers_of):
+            if i is None:
+                continue
+            error = max(0.0, abs(apart[j]) - math.ldexp(4.0, self._lsb(i)))
+            sigma = math.sqrt(max(variances[j], 0.0))
             ratio = error / sigma if sigma > 1e-9 * (1e-300 + abs(self.a.arrays["kf.x"][i])) else 0.0
             if not ratio <= worst[1]:
                 worst = (i, ratio)

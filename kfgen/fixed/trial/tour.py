@@ -103,7 +103,7 @@ class Tour(Probe):
                 self.read(sensor, readings[sensor.name])
                 alike = self._tried(f"update_{sensor.name}")
         self.between()
-        n = len(self.code.model.states)
+        n = len(self.code.model.errors)
         x = self.a.arrays["kf.x"]
         if not alike or not within(self.box, x, self.limits, lambda: self.real.variances(self.a, n)):
             return False
@@ -127,7 +127,7 @@ class Tour(Probe):
     def _variances(self) -> None:
         if "get_covariance" not in self.names:
             return
-        n = len(self.code.model.states)
+        n = len(self.code.model.errors)
         other = self.b.copy()
         self.integer.run("get_covariance", other)
         for i, wanted in enumerate(self.real.variances(self.a, n)):

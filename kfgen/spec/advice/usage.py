@@ -12,7 +12,7 @@ from kfgen.spec.modes import mode_specs
 from kfgen.spec.operations import NoValue
 from kfgen.spec.problems import short
 from kfgen.spec.tree import Expression, names
-from kfgen.spec.types import Definition, Spec
+from kfgen.spec.types import Definition, Group, Spec
 
 
 def advice(spec: Spec) -> Iterator[Advice]:
@@ -56,22 +56,55 @@ def _unused(spec: Spec) -> Iterator[Advice]:
     declared += [("parameter", p.name, p.value.place) for p in spec.parameters]
     declared += [("input", i.name, i.place) for i in spec.inputs]
     declared += [("definition", d.name, d.value.place) for mode in modes for d in mode.let]
+    whole = Whole(spec.groups)
     for kind, name, place in declared:
-        if name not in used:
-            yield Advice(place, f"nothing uses the {kind} {short(name)}", "use it, or remove it", "unused")
+        if not whole.parts(name) & used:
+            text = f"nothing uses the {kind} {short(whole.name(name))}"
+            yield Advice(place, text, "use it, or remove it", "unused")
+    yield from _unused_inputs(spec, modes)
+
+
+def _unused_inputs(spec: Spec, modes: list[Spec]) -> Iterator[Advice]:
+    """Inputs of sensors that stand in none of their formulas."""
+    for sensor in spec.measurements:
+        own = [s for mode in modes for s in mode.measurements if s.name == sensor.name]
+        rules = [rule for rule in spec.initialize if rule.sensor == sensor.name]
+        used = {name for part in (*own, *rules) for e in expressions(part) for name in names(e.tree)}
+        whole = Whole(sensor.groups)
+        for given in sensor.inputs:
+            if not whole.parts(given.name) & used:
+                text = f"nothing uses the input {short(whole.name(given.name))} of {short(sensor.name)}"
+                yield Advice(given.place, text, "use it in h, R or gate, or remove it", "unused")
+
+
+class Whole:
+    """Which vector a part belongs to."""
+
+    def __init__(self, groups: tuple[Group, ...]) -> None:
+        self.groups = {part: group for group in groups for part in group.parts}
+
+    def name(self, part: str) -> str:
+        return self.groups[part].name if part in self.groups else part
+
+    def parts(self, name: str) -> set[str]:
+        """The parts of the vector of a part, itself where it is of none."""
+        return set(self.groups[name].parts) if name in self.groups else {name}
 
 
 def _noises(mode: Spec) -> Iterator[Advice]:
     acting = _names(mode.dynamics.f.values(), mode.let)
+    whole = Whole(mode.groups)
     for noise in mode.noise:
-        if noise.name not in acting:
-            text = f"the noise {short(noise.name)} does not stand in `dynamics.f`, so it does nothing"
+        if not whole.parts(noise.name) & acting:
+            text = f"the noise {short(whole.name(noise.name))} does not stand in `dynamics.f`, so it does nothing"
             yield Advice(noise.place, text, "write it into f, where it acts; or as a variance into Q", "unused_noise")
     for sensor in mode.measurements:
         seen = _names([component.h for component in sensor.components], mode.let)
+        whole = Whole(sensor.groups)
         for noise in sensor.noise:
-            if noise.name not in seen:
-                text = f"the noise {short(noise.name)} stands in no h of {short(sensor.name)}, so it does nothing"
+            if not whole.parts(noise.name) & seen:
+                name = short(whole.name(noise.name))
+                text = f"the noise {name} stands in no h of {short(sensor.name)}, so it does nothing"
                 yield Advice(noise.place, text, "write it into h, or as `std` of a component", "unused_noise")
 
 

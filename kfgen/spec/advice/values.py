@@ -14,6 +14,7 @@ from kfgen.spec.constants import NotConstant, environment_of, value
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.operations import NoValue, less
 from kfgen.spec.problems import short
+from kfgen.spec.raw import key_of
 from kfgen.spec.tree import Call, Expression, Name, Number, Tree, names
 from kfgen.spec.types import Range, Spec
 
@@ -151,7 +152,7 @@ def _converts(tree: Tree) -> bool:
 
 def _deviations(spec: Spec) -> Iterator[Advice]:
     for formula in expressions(spec):
-        key = formula.place.path.rpartition(".")[2]
+        key = key_of(formula.place.path)
         if key in ("std", "root_density"):
             tree = formula.tree  # the square of what was written
             written = tree.args[0] if isinstance(tree, Call) and tree.op == "pow" else tree

@@ -6,12 +6,12 @@ import random
 from fractions import Fraction
 
 from kfgen.errors import Place
+from kfgen.spec.contexts import Context
 from kfgen.spec.matrices import close, is_semidefinite, smallest_eigenvalue, worst_pair
 from kfgen.spec.operations import Value, apply
 from kfgen.spec.problems import short
-from kfgen.spec.raw import BAD
+from kfgen.spec.raw import BAD, key_of
 from kfgen.spec.rules.facts import Facts, Model, show
-from kfgen.spec.scopes import Context
 from kfgen.spec.tree import Call, Expression, Number
 from kfgen.spec.types import Matrix, Noise
 
@@ -25,12 +25,19 @@ def check(facts: Facts) -> None:
         for sensor in model.measurements:
             known = facts.known(model.context)
             path = sensor.place.path
-            names = [component.name for component in sensor.components]
-            for component in sensor.components:
-                _variance(facts, component.variance, known)
+            names = list(sensor.errors)
+            variances = [component.variance for component in sensor.components]
+            for variance in [*variances, *(v for r in sensor.rotations for v in r.variances)]:
+                _variance(facts, variance, known)
             if sensor.R is not None:
-                _matrix(facts, sensor.R, names, "component", f"{path}.R", model.context, known)
+                of = "coordinate of the residual" if sensor.rotations else "component"
+                _matrix(facts, sensor.R, names, of, f"{path}.R", model.context, known)
             _noises(facts, sensor.noise, sensor.noise_covariance, f"{path}.noise_covariance", model.context)
+
+
+def _coordinate(model: Model) -> str:
+    """What P has one row for; a quaternion has three of the error."""
+    return "error coordinate" if model.rotations else "state"
 
 
 def _variance(facts: Facts, expression: Expression | None, known: Known) -> Value | None:
@@ -38,7 +45,7 @@ def _variance(facts: Facts, expression: Expression | None, known: Known) -> Valu
     if expression is None or expression.tree == BAD:
         return None
     tree = expression.tree
-    rooted = expression.place.path.rpartition(".")[2] in ("std", "root_density")
+    rooted = key_of(expression.place.path) in ("std", "root_density")
     if rooted and isinstance(tree, Call) and tree.op == "pow" and tree.args[1] == Number(Fraction(2)):
         root = facts.tree(tree.args[0], known)
         if root is not None and root < 0:
@@ -55,13 +62,13 @@ def _variance(facts: Facts, expression: Expression | None, known: Known) -> Valu
 
 
 def _initial(facts: Facts, model: Model) -> None:
-    names = [state.name for state in model.states]
+    names = list(model.errors)
     known = facts.folded
     if model.P0 is not None:
         path = f"{model.prefix}P0" if facts.written(f"{model.prefix}P0") else "P0"
-        _matrix(facts, model.P0, names, "state", path, model.context, known)
+        _matrix(facts, model.P0, names, _coordinate(model), path, model.context, known)
         return
-    variances = {state.name: _variance(facts, state.variance, known) for state in model.states}
+    variances = {name: _variance(facts, variance, known) for name, variance in model.variances.items()}
     seen: dict[frozenset[str], Place] = {}
     entries: dict[tuple[str, str], Value] = {}
     complete = all(v is not None for v in variances.values())
@@ -85,7 +92,8 @@ def _initial(facts: Facts, model: Model) -> None:
     if not complete or not entries:
         return
     rows = [[variances[a] if a == b else entries.get((a, b), Fraction(0)) for b in names] for a in names]
-    place = facts.at(f"{model.prefix}covariances", "covariances")
+    first = model.covariances[0].value.place
+    place = facts.at(f"{model.prefix}covariances", "covariances", otherwise=first)
     hint = "make the covariances smaller: |c| <= std1*std2"
     _semidefinite(facts, rows, names, place, "the initial covariance", hint)
 
@@ -94,8 +102,8 @@ def _process(facts: Facts, model: Model) -> None:
     known = facts.known(model.context)
     Q = model.dynamics.Q
     if isinstance(Q, tuple):
-        names = [state.name for state in model.states]
-        _matrix(facts, Q, names, "state", f"{model.dynamics.place.path}.Q", model.context, known)
+        names = list(model.errors)
+        _matrix(facts, Q, names, _coordinate(model), f"{model.dynamics.place.path}.Q", model.context, known)
     else:
         for expression in Q.values():
             _variance(facts, expression, known)
@@ -131,7 +139,8 @@ def _matrix(facts: Facts, matrix: Matrix, names: list[str], of: str, path: str, 
             facts.add(at, text, f"write {size} rows of {size} numbers")
             return
     if len(matrix) != size or len(matrix[0]) != size:
-        plural = of + "s" if size != 1 else of
+        head, _, tail = of.partition(" of ")
+        plural = of if size == 1 else f"{head}s of {tail}" if tail else f"{head}s"
         text = f"`{key}` is {len(matrix)} x {len(matrix[0]) if matrix else 0}, but there are {size} {plural}"
         facts.add(place, text, f"write {size} rows of {size} numbers, in the order {', '.join(names[:8])}")
         return

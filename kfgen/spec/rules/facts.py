@@ -10,12 +10,13 @@ import mpmath
 
 from kfgen.errors import Place
 from kfgen.spec.constants import NotConstant, environment_of, keep, value, with_parameters
+from kfgen.spec.contexts import Context
 from kfgen.spec.operations import NoValue, Value, less, real
 from kfgen.spec.problems import Problems
 from kfgen.spec.raw import BAD
-from kfgen.spec.scopes import Context, Scopes
+from kfgen.spec.scopes import Scopes
 from kfgen.spec.tree import Expression, Tree
-from kfgen.spec.types import Covariance, Dynamics, Filter, Matrix, Noise, Sensor, Spec, State
+from kfgen.spec.types import Covariance, Dynamics, Filter, Matrix, Noise, Rotation, Sensor, Spec, State, error_names
 from kfgen.spec.walk import Walker
 
 
@@ -33,6 +34,19 @@ class Model:
     filter: Filter
     context: Context
     prefix: str = ""  # of the key paths that are its own
+    rotations: tuple[Rotation, ...] = ()
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """The coordinates of the error, in order."""
+        return error_names((state.name for state in self.states), self.rotations)
+
+    @property
+    def variances(self) -> dict[str, Expression | None]:
+        """The initial variance of each coordinate of the error."""
+        known = {state.name: state.variance for state in self.states}
+        known |= {e: v for r in self.rotations for e, v in zip(r.errors, r.variances, strict=True)}
+        return {name: known[name] for name in self.errors}
 
 
 class Facts:
@@ -122,13 +136,13 @@ class Facts:
         if s.imm is None:
             yield Model(
                 s.states, s.covariances, s.P0, s.noise, s.noise_covariance, s.dynamics, s.measurements,
-                s.filter, self.scopes.contexts[""],
+                s.filter, self.scopes.contexts[""], "", s.rotations,
             )  # fmt: skip
             return
         for m in s.imm.modes:
             yield Model(
                 m.states, m.covariances, m.P0, m.noise, m.noise_covariance, m.dynamics, m.measurements,
-                m.filter, self.scopes.contexts[m.name], f"imm.modes.{m.name}.",
+                m.filter, self.scopes.contexts[m.name], f"imm.modes.{m.name}.", m.rotations,
             )  # fmt: skip
 
 

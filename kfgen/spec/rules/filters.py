@@ -21,7 +21,7 @@ def check(facts: Facts) -> None:
         chosen = model.filter
         _excluded(facts, chosen)
         _consider(facts, model)
-        if chosen.type == "kf":
+        if chosen.type == "kf" and not model.rotations:
             _linear(facts, model)
         if chosen.gain == "steady" and facts.spec.imm is None:
             _steady(facts, model)
@@ -88,7 +88,7 @@ def _consider(facts: Facts, model: Model) -> None:
     chosen = model.filter
     if len(set(chosen.consider)) < len(chosen.consider):
         facts.add(_place(chosen, "consider"), "a state stands twice in `consider`", "name each once")
-    elif model.states and set(chosen.consider) >= {state.name for state in model.states}:
+    elif model.states and set(chosen.consider) >= set(model.errors):
         facts.add(_place(chosen, "consider"), "no state is left to be estimated", "leave a state out of `consider`")
     elif facts.empty(f"{chosen.place.path}.consider"):
         facts.add(_place(chosen, "consider"), "`consider` names no state", "name a state, or remove the key")
@@ -105,9 +105,7 @@ def _variables(model: Model, sensor: Sensor | None = None) -> frozenset[str]:
 def _unknown(model: Model, expression: Expression) -> bool:
     """Whether a mistake in its names has been reported, so that nothing more can be said."""
     names = model.context.uses(expression)
-    return expression.tree == BAD or any(
-        n not in model.context.kinds and n not in ("pi", "e", "dt", "t") for n in names
-    )
+    return expression.tree == BAD or any(model.context.kind_of(n) is None for n in names)
 
 
 def _known(facts: Facts, model: Model) -> dict[str, Value]:
@@ -183,7 +181,7 @@ def _constant_coefficients(
 
 def _varying(model: Model, names: frozenset[str]) -> str:
     fixed = model.context.spec.dt is not None and not model.context.spec.dt.run_time
-    kinds = {model.context.kinds.get(name, name) for name in names} - ({"dt"} if fixed else set())
+    kinds = {model.context.kind_of(name) or name for name in names} - ({"dt"} if fixed else set())
     return " and ".join(_VARYING[kind] for kind in _VARYING if kind in kinds)
 
 

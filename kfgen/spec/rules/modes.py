@@ -114,6 +114,8 @@ def _sensors(facts: Facts, imm: Imm) -> None:
             kinds = [(a.kind, b.kind) for a, b in zip(own.components, other.components, strict=True)]
             if any(a != b for a, b in kinds):
                 facts.add(own.place, f"`kind` in {short(own.name)} differs between modes", "write the same in all")
+            if [r.error for r in own.rotations] != [r.error for r in other.rotations]:
+                facts.add(own.place, f"`error` in {short(own.name)} differs between modes", "write the same in all")
 
 
 def _steady(facts: Facts, imm: Imm) -> None:
@@ -127,8 +129,8 @@ def _steady(facts: Facts, imm: Imm) -> None:
 
 
 def _shape(sensors: tuple[Sensor, ...]) -> list[tuple[str, list[str]]]:
-    return [(sensor.name, [component.name for component in sensor.components]) for sensor in sensors]
+    return [(sensor.name, [each.name for each in sensor.fields]) for sensor in sensors]
 
 
 def _listed(sensors: tuple[Sensor, ...]) -> str:
-    return "; ".join(f"{s.name}: {', '.join(c.name for c in s.components)}" for s in sensors)
+    return "; ".join(f"{s.name}: {', '.join(each.name for each in s.fields)}" for s in sensors)

@@ -31,7 +31,7 @@ def _gamma(facts: Facts, model: Model, points: SigmaPoints) -> None:
     kappa = facts.value(points.kappa)
     if kappa is None or points.kappa is None or not model.states:
         return
-    count = len(model.states)
+    count = len(model.errors)
     if points.kind == "wiki":
         facts.check_range(points.kappa, "kappa", 0)
         return
@@ -42,17 +42,18 @@ def _gamma(facts: Facts, model: Model, points: SigmaPoints) -> None:
 
 
 def _custom(facts: Facts, model: Model, points: SigmaPoints, path: str) -> None:
-    count = len(model.states)
+    count = len(model.errors)
     if points.points is None or not count:
         return
     place = facts.at(f"{path}.points", otherwise=model.filter.place)
     if not points.points:
         facts.add(place, "there are no points", "write one row per point")
         return
+    what = "coordinates of the error" if model.rotations else "states"
     for i, row in enumerate(points.points):
         if len(row) != count:
             at = facts.walker.value_place(f"{path}.points[{i}]", place)
-            text = f"point {i + 1} has {len(row)} coordinates, but there are {count} states"
+            text = f"point {i + 1} has {len(row)} coordinates, but there are {count} {what}"
             facts.add(at, text, f"write {count} numbers per point")
             return
     for key, weights in (("wm", points.wm), ("wc", points.wc)):

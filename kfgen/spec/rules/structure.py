@@ -56,7 +56,7 @@ def _sensor(facts: Facts, sensor: Sensor, model: Model) -> None:
         if component.h.tree == BAD or not states:
             continue
         used = model.context.uses(component.h)
-        unknown = [n for n in used if n not in model.context.kinds and n not in ("pi", "e", "dt", "t")]
+        unknown = [n for n in used if model.context.kind_of(n) is None]
         if not used & states and not unknown and not used & doubtful:
             facts.add(component.h.place, "h depends on no state, so it measures nothing", "write what is measured")
         if component.residual is not None and component.residual.tree != BAD:
@@ -71,6 +71,20 @@ def _residual(facts: Facts, residual: Expression, model: Model) -> None:
 
 
 def _initialize(facts: Facts) -> None:
-    initialize = facts.spec.initialize
-    if initialize is not None and not initialize.states and facts.empty("initialize.states"):
-        facts.add(facts.at("initialize.states"), "no state is set", "write `states: {px: x}`")
+    """Each sensor sets states of its own."""
+    sensors: set[str] = set()
+    states: dict[str, str] = {}
+    for initialize in facts.spec.initialize:
+        path = initialize.place.path
+        if not initialize.states and facts.empty(f"{path}.states"):
+            facts.add(facts.at(f"{path}.states"), "no state is set", "write `states: {px: x}`")
+        if initialize.sensor in sensors:
+            text = f"the sensor {short(initialize.sensor)} is named twice"
+            facts.add(initialize.place, text, "set all states in one entry")
+            continue
+        sensors.add(initialize.sensor)
+        for state, value in initialize.states.items():
+            other = states.setdefault(state, initialize.sensor)
+            if other != initialize.sensor and state not in facts.scopes.doubtful:
+                text = f"the state {short(state)} is set by {short(other)} already"
+                facts.add(value.place, text, "let one sensor set it")

@@ -87,6 +87,12 @@ class LoopedFull(Looped, FullStore):
     ) -> tuple[ArrayEntries, list[ArrayGain]]:
         return self.updates.update(t, P, measurements, motion)
 
+    def turned(
+        self, t: Trace, P: ArrayEntries, T: Rows, Q: Additive, noise: list[tuple[Vector, Value]]
+    ) -> ArrayEntries:
+        before = P.written() if P.terms else P
+        return self.predict(t, before, T, Q, noise).written()
+
     def learn(self, moved: Displacement, field: str, rate: Fraction, sure: bool) -> None:
         t, n = moved.space.t, self.n
         with t.loop("j", 0, n) as j:

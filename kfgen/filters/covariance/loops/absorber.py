@@ -66,6 +66,18 @@ class Absorber:
         unit: Vector = [t.one, *[t.zero] * (n - 1)]
         self._all_columns(space, False, unit, column_of, weight, lambda start: None, lambda k: 2 * k + (2 + n % 2))
 
+    def turn(
+        self, space: Space, T: Rows, Q: Additive, noise: list[tuple[Vector, Value]],
+        column_of: Callable[[Value, Put], None], weight: Callable[[int | Value], Value],
+    ) -> None:  # fmt: skip
+        """The same of columns that do not stand in the struct."""
+        n, t, w = self.n, space.t, self.columns(space)
+        self.start(t, space, Q)
+        for c in range(0, len(noise), 2):
+            self.absorb_columns(space, False, noise[c : c + 2])
+        self._all_columns(space, False, [row[0] for row in T], column_of, weight,
+                          lambda start: self._transition(t, T, w, start), lambda pair: integer(t, n))
+
     def _all_columns(
         self, space: Space, sure: bool, first: Vector, column_of: Callable[[Value, Put], None],
         weight: Callable[[int | Value], Value], change: Callable[[Value], None], reach: Callable[[Value], Value],
@@ -86,8 +98,8 @@ class Absorber:
 
     def columns(self, space: Space) -> Array:
         """Two columns to be absorbed, at zero; so they are afterwards."""
-        new = "w" not in space.arrays
-        w = space.array("w", 2 * self.n)
+        new = space.pair not in space.arrays
+        w = space.array(space.pair, 2 * self.n)
         if new:
             with space.t.loop("i", 0, 2 * self.n) as i:
                 w[i] = 0

@@ -34,7 +34,7 @@ class LoopedFactors(Generic[P]):
         self.n = len(order)
         self.function = how.absorb
         self.tolerance = 8 * self.n * how.epsilon
-        self.space = Space(t)
+        self.space = Space(t, pair="columns")  # w is one column
         self.failures: list[Value] = []
         absorber.start(t, self.space, Q)
         self.w = self.space.array("w", self.n)

@@ -16,6 +16,7 @@ class Space:
 
     t: Trace
     arrays: dict[str, Array] = field(default_factory=dict)
+    pair: str = "w"  # the array of two columns to be absorbed
     h: set[int] = field(default_factory=set)  # where the array of a row of H is not zero
 
     def array(self, name: str, size: int) -> Array:

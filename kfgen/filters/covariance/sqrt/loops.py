@@ -38,6 +38,8 @@ from kfgen.ir.trace import Array, Trace, Value
 class LoopedSqrt(ByFactors, SqrtStore):
     """The same steps as the straight sibling's."""
 
+    rooted = True
+
     def __init__(self, sibling: StraightSqrt, how: Looping) -> None:
         ByFactors.__init__(self, sibling, how)
         SqrtStore.__init__(self, sibling.n)
@@ -78,6 +80,10 @@ class LoopedSqrt(ByFactors, SqrtStore):
         t.section("roots")
         self._take_roots(P.space)
         return ArrayRoot(P.space, self, own=True)
+
+    def _turned(self, P: ArrayRoot) -> ArrayRoot:
+        self._take_roots(P.space)
+        return P
 
     def _take_roots(self, space: Space) -> None:
         """From U D U^T in the arrays of the absorber to S S^T."""

@@ -8,7 +8,7 @@ from kfgen.filters.algebra.factors import columns_of, factor_columns, gram_schmi
 from kfgen.filters.algebra.linalg import Rows, Vector, dot, quotients, times
 from kfgen.filters.algebra.measurement import Measurement, bierman, downdate
 from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_one, is_zero, require_nonnegative, select
-from kfgen.filters.algebra.rank_one import rank_one, unit_columns
+from kfgen.filters.algebra.rank_one import neighbours, rank_one, turned_block, unit_columns
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.algebra.triangles import strict
 from kfgen.filters.covariance.gather import GatheredFactors
@@ -69,6 +69,15 @@ class StraightUD(StraightLine, UDStore):
             t.section("F U D U^T F^T + Q" + ("" if n <= self.group else f", columns {k} to {part[-1]}"))
             rank_one(U1, D1, [(unit_columns(F, U, c), D[c], c) for c in part])
         return U1, D1
+
+    def turned(self, t: Trace, P: Factors, T: Rows, Q: Additive, noise: list[tuple[Vector, Value]]) -> Factors:
+        blocks = neighbours(T)
+        if blocks is None or noise or not all(is_zero(q) for row in Q.entries() for q in row):
+            return self.predict(t, P, T, Q, noise)
+        U, D = [list(row) for row in P[0]], list(P[1])
+        for block in blocks:
+            turned_block(U, D, T, block)
+        return U, D
 
     def _absorb(self, t: Trace, U: Rows, D: Vector, columns: list[tuple[Vector, Value, int]], what: str) -> None:
         for k in range(0, len(columns), self.group):
