@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kfgen.advice.track import Array, Track, errors
+from kfgen.advice.track import Array, Track
 from kfgen.errors import Advice
 from kfgen.spec.problems import short
 from kfgen.spec.types import Spec
@@ -19,20 +19,20 @@ def advice(spec: Spec, tracks: Sequence[Track]) -> Iterator[Advice]:
     blind = _unseen(tracks)
     if not blind.size:
         return
-    states = errors(spec)
-    silent = {i for i in range(len(states)) if _known(tracks, i)}
+    names, places = tracks[0].names, tracks[0].places
+    silent = {i for i in range(len(names)) if _known(tracks, i)}
     for group in _groups(blind):
-        if silent & set(group) or any(states[i].name in track.spec.filter.consider for track in tracks for i in group):
+        if silent & set(group) or any(names[i] in track.spec.filter.consider for track in tracks for i in group):
             continue  # what nobody claims to estimate
-        first = states[group[0]]
+        first = group[0]
         if len(group) == 1:
-            text = f"no sensor sees {short(first.name)}, neither itself nor by what it does to other states"
+            text = f"no sensor sees {short(names[first])}, neither itself nor by what it does to other states"
             cure = "measure something that depends on it, remove it, or give it to `consider`"
         else:
-            listed = ", ".join(short(states[i].name) for i in group[:8]) + (", ..." if len(group) > 8 else "")
+            listed = ", ".join(short(names[i]) for i in group[:8]) + (", ..." if len(group) > 8 else "")
             text = f"no sensor tells {listed} apart: they can change together without a trace in any measurement"
             cure = "measure one of them by itself, or remove one"
-        yield Advice(first.place, text, cure, "unobservable")
+        yield Advice(places[first], text, cure, "unobservable")
 
 
 def _unseen(tracks: Sequence[Track]) -> Array:
@@ -40,8 +40,8 @@ def _unseen(tracks: Sequence[Track]) -> Array:
     stacked: list[Array] = []
     bounds: list[Array] = []  # of the same with absolute terms: what round-off is measured by
     for track in tracks:
-        onward = absolute = np.eye(track.x.shape[1])
-        for k in range(len(track.x)):
+        onward = absolute = np.eye(len(track.names))
+        for k in range(len(track.size)):
             for name, H in track.H.items():
                 size = np.sqrt(np.maximum(np.diag(track.R[name]), 0.0))
                 size = np.where(size > 0, size, 1.0)[:, None]

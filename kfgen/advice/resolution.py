@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.advice.track import Array, Track, errors
+from kfgen.advice.track import Array, Track
 from kfgen.errors import Advice
 from kfgen.scalar_names import FLOAT
 from kfgen.spec.problems import short
@@ -35,23 +35,23 @@ def advice(spec: Spec, tracks: Sequence[Track]) -> Iterator[Advice]:
     if spec.scalar != FLOAT:
         return
     for track in tracks:
-        magnitude = np.abs(track.x).max(axis=0)
+        magnitude = track.size.max(axis=0)
         grain, step = ulp(magnitude), np.median(np.abs(track.step), axis=0)
-        doubtful = _doubtful(track, grain) & [state.name not in spec.code.compensated for state in errors(spec)]
+        doubtful = _doubtful(track, grain) & track.real & [name not in spec.code.compensated for name in track.names]
         if not doubtful.any():
             continue
         sigma = _settled(track)
-        for i, state in enumerate(errors(spec)):
+        for i, name in enumerate(track.names):
             lost = 0 < step[i] < grain[i] / 2 and 10 * ROUNDINGS * grain[i] > SHARE * sigma[i] > 0
             if not doubtful[i] or not (lost or too_coarse(magnitude[i : i + 1], sigma[i : i + 1])[0]):
                 continue
             moved = f", a step moves it by {step[i]:.2g}" if step[i] else ""
             text = (
-                f"float resolves {short(state.name)} to {grain[i]:.2g} at {magnitude[i]:.3g}{moved}, and its standard "
+                f"float resolves {short(name)} to {grain[i]:.2g} at {magnitude[i]:.3g}{moved}, and its standard "
                 f"deviation is {sigma[i]:.2g}: rounding " + ("takes its motion" if lost else "counts beside it")
             )
             cure = "count it from a local origin, or write `scalar: double`"
-            yield Advice(state.place, text, cure, "far_origin")
+            yield Advice(track.places[i], text, cure, "far_origin")
 
 
 def _doubtful(track: Track, grain: Array) -> Flags:
@@ -67,8 +67,8 @@ def _doubtful(track: Track, grain: Array) -> Flags:
 
 def _settled(track: Track) -> Array:
     """Standard deviations (n) after the covariance has settled: the filter's own equations, all sensors in each row."""
-    P, n = track.model.P0.copy(), track.x.shape[1]
-    rows = len(track.x)
+    P, n = track.model.P0.copy(), len(track.names)
+    rows = len(track.size)
     for k in range(20 * rows):
         F = track.F[k % rows]
         P = F @ P @ F.T + track.Q

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.errors import KfgenError
+from kfgen.errors import KfgenError, Place
 from kfgen.reference.model import Context, Model
 from kfgen.reference.process import Process
 from kfgen.reference.sensor import Reading, SensorModel
@@ -16,7 +16,7 @@ from kfgen.simulate import simulate
 from kfgen.spec.advice.usage import expressions
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.tree import Call
-from kfgen.spec.types import Dynamics, Spec, State
+from kfgen.spec.types import Dynamics, Spec
 
 Array = NDArray[np.float64]
 
@@ -27,16 +27,19 @@ WORK = 100_000  # operations, with gradients: about a second
 
 @dataclass(frozen=True)
 class Track:
-    """A spec (of a mode) with n states along k rows.
+    """A spec (of a mode) with an error of n along k rows.
 
-    x (k, n): the states, 0 in place of the errors of a quaternion. step (k, n): what f moves them by, without noise.
-    F (k, n, n), Q (n, n): of the step from each
+    names, places: of the coordinates of the error; real (n): which are states, and not of a rotation. size (k, n): how
+    large the states are. step (k, n): what f moves them by, without noise. F (k, n, n), Q (n, n): of the step from each
     row, its noise at the first. H, R: sensor -> (k, m, n), (m, m) likewise.
     """
 
     spec: Spec
     model: Model
-    x: Array
+    names: tuple[str, ...]
+    places: tuple[Place, ...]
+    real: NDArray[np.bool_]
+    size: Array
     step: Array
     F: Array
     Q: Array
@@ -54,9 +57,10 @@ def follow(spec: Spec) -> list[Track]:
     x = np.column_stack([log.columns[f"true.{state.name}"] for state in spec.states])
     u = np.column_stack([log.columns[each.name] for each in spec.inputs] or [np.zeros((rows, 0))])
     t = log.columns["t"]
+    given = {s.name: np.array([log.columns[f"{s.name}.{i.name}"] for i in s.inputs]).T for s in spec.measurements}
     try:
         with np.errstate(all="ignore"):
-            return [_along(mode, x, u, t) for mode in mode_specs(spec)]
+            return [_along(mode, x, u, t, given) for mode in mode_specs(spec)]
     except StepError:
         raise KfgenError(f"{spec.name}: the model cannot be linearised along a track of its own") from None
 
@@ -89,11 +93,12 @@ def _size(spec: Spec) -> int:
     return nodes((dynamics, spec.let)) * (stages if dynamics.form == "continuous" else 1) + nodes(spec.measurements)
 
 
-def _along(spec: Spec, x: Array, u: Array, t: Array) -> Track:
+def _along(spec: Spec, x: Array, u: Array, t: Array, given: dict[str, Array]) -> Track:
+    """given: the own inputs of each sensor that has some (k, inputs)."""
     model = Model(spec)
     process = Process(model)
     dt = 1.0 if spec.dt is None else model.number(spec.dt.nominal)
-    rows, n = len(x), model.n
+    space, rows, n = model.space, len(x), model.n
     F, step = np.empty((rows, n, n)), np.empty((rows, n))
     sensors = {sensor.name: SensorModel(model, sensor) for sensor in spec.measurements}
     H = {name: np.empty((rows, sensor.space.k, n)) for name, sensor in sensors.items()}
@@ -102,10 +107,11 @@ def _along(spec: Spec, x: Array, u: Array, t: Array) -> Track:
     for k in range(rows):
         context = Context(model.values, u[k], float(t[k]), dt)
         after = process.linearise(x[k], context)
-        F[k], step[k] = after.F, model.space.difference(after.x, x[k])
+        F[k], step[k] = after.F, space.difference(after.x, x[k])
         for name, sensor in sensors.items():
             used = tuple(range(sensor.m))
-            found = sensor.linearise(x[k], Reading(sensor, np.zeros(sensor.m), used, context))
+            own = replace(context, own=given[name][k]) if sensor.own else context
+            found = sensor.linearise(x[k], Reading(sensor, np.zeros(sensor.m), used, own))
             H[name][k] = found.H
             R.setdefault(name, found.R)
         if k == 0:
@@ -114,13 +120,8 @@ def _along(spec: Spec, x: Array, u: Array, t: Array) -> Track:
         step[:, i] -= period * np.round(step[:, i] / period)
     if not (np.isfinite(F).all() and all(np.isfinite(each).all() for each in H.values())):
         raise KfgenError(f"{spec.name}: the model has no finite derivatives along a track of its own")
-    return Track(spec, model, np.array([model.space.flat(row) for row in x]), step, F, Q, H, R)
-
-
-def errors(spec: Spec) -> list[State]:
-    """What the columns of a track are of: the states, three errors of a quaternion in place of its numbers."""
-    found = {state.name: state for state in spec.states}
-    for rotation in spec.rotations:
-        first = found[rotation.parts[0]]
-        found |= {name: replace(first, name=name) for name in rotation.errors}
-    return [found[name] for name in spec.errors]
+    places = {state.name: state.place for state in spec.states}
+    places |= {name: rotation.place for rotation in spec.rotations for name in rotation.errors}
+    size = np.array([space.size(each) for each in x])
+    known = tuple(places[name] for name in model.errors)
+    return Track(spec, model, model.errors, known, space.real, size, step, F, Q, H, R)

@@ -11,7 +11,8 @@ import sympy
 from kfgen.errors import Mistake, SpecError
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
-from kfgen.model.model import Model, NoiseModel, SensorModel
+from kfgen.model.first import build_firsts
+from kfgen.model.model import Model, NoiseModel, OutputModel, SensorModel
 from kfgen.model.options import INNOVATION, Options, build_gate, build_options
 from kfgen.model.rotations import Names, Registry, increment, rotation_models
 from kfgen.model.start import initial_covariance
@@ -83,6 +84,8 @@ class _Builder:
         sensors = tuple(self.sensor(s) for s in spec.measurements)
         options = self.options(spec.filter)
         Q_noise = self.covariance(spec.noise, spec.noise_covariance)
+        outputs = tuple(OutputModel(o.name, self.tree(o.value)) for o in spec.outputs)
+        firsts = build_firsts(spec, self.names)
         return Model(
             spec=spec,
             symbols={**self.symbols, **{name: sympy.Symbol(name) for name in self.registry.values}},
@@ -108,6 +111,8 @@ class _Builder:
             dt=fixed,
             dt_limits=limits,
             options=options,
+            firsts=firsts,
+            outputs=outputs,
         )
 
     def turns(self) -> tuple[tuple[Symbolic, ...] | None, ...]:
@@ -165,8 +170,8 @@ class _Builder:
         return tuple(tuple(variances[i] if i == j else sympy.S.Zero for j in range(q)) for i in range(q))
 
     def sensor(self, sensor: Sensor) -> SensorModel:
-        for noise in sensor.noise:
-            self.declare(noise.name)
+        for name in (*(w.name for w in sensor.noise), *(i.name for i in sensor.inputs)):
+            self.declare(name)
         components = [c.name for c in sensor.components]
         if sensor.R is not None:
             R = self.matrix(sensor.R)

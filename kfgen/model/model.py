@@ -10,6 +10,7 @@ from typing import Any
 
 from kfgen.errors import Place
 from kfgen.geometry import Space, part_of
+from kfgen.model.first import FirstModel
 from kfgen.model.options import GateModel, Options
 from kfgen.model.rotations import RotationModel, Turned
 from kfgen.model.symbolic import partials
@@ -54,6 +55,11 @@ class SensorModel:
         return _space(self.periods, self.rotations)
 
     @property
+    def inputs(self) -> tuple[str, ...]:
+        """Known values that come with a measurement; their fields stand behind the components'."""
+        return tuple(i.name for i in self.spec.inputs)
+
+    @property
     def dimension(self) -> int:
         """Degrees of freedom of an innovation."""
         return self.space.dimension
@@ -62,6 +68,14 @@ class SensorModel:
     def errors(self) -> tuple[str, ...]:
         """The names of the entries of an innovation."""
         return error_names([c.name for c in self.spec.components], self.spec.rotations)
+
+
+@dataclass(frozen=True)
+class OutputModel:
+    """What firmware reads: a function of the state, parameters and t."""
+
+    name: str
+    value: Symbolic
 
 
 @dataclass(frozen=True)
@@ -91,6 +105,8 @@ class Model:
     dt: Fraction | None  # None: given at run time
     dt_limits: tuple[Fraction | None, Fraction | None] = (None, None)
     options: Options = field(default_factory=Options)
+    outputs: tuple[OutputModel, ...] = ()
+    firsts: tuple[FirstModel, ...] = ()  # of a bank: its head's
     keeps_time: bool = False  # whether something outside of the model depends on t
     rotations: tuple[RotationModel, ...] = ()
     turns: tuple[tuple[Symbolic, ...] | None, ...] = ()
@@ -159,9 +175,18 @@ class Model:
         spec = replace(self.spec, filter=filter_of(self.spec.filter, sensor.spec))
         return replace(self, spec=spec, options=sensor.options)
 
+    def first(self, sensor: SensorModel) -> FirstModel | None:
+        """What the first measurement of a sensor sets."""
+        return next((rule for rule in self.firsts if rule.sensor == sensor.name), None)
+
+    @property
+    def waits(self) -> bool:
+        """Whether nothing is done until certain sensors have come."""
+        return any(rule.waits for rule in self.firsts)
+
     def uses_time(self) -> bool:
         """Whether anything depends on t, so that the filter has to keep it."""
-        all_expressions = self.dynamics_expressions()
+        all_expressions = [*self.dynamics_expressions(), *(output.value for output in self.outputs)]
         for sensor in self.sensors:
             all_expressions += self.sensor_expressions(sensor)
         return self.keeps_time or "t" in self.uses(*all_expressions)

@@ -14,6 +14,7 @@ import numpy as np
 
 from kfgen.reference import rotations
 from kfgen.reference.dual import Matrix, Number, Vector, jacobian, value_of, values, variables
+from kfgen.reference.status import Status, StepError
 from kfgen.spec.types import Rotation
 
 Numbers = list[Number]
@@ -130,9 +131,12 @@ class Manifold:
             x[block.numbers] = x[block.numbers] / math.hypot(*x[block.numbers])
         return x
 
-    def short(self, x: Vector) -> bool:
-        """Whether a quaternion in x (n) is too short to be one."""
-        return any(math.hypot(*x[block.numbers]) < _SHORTEST for block in self.rotations)
+    def judge(self, x: Vector) -> None:
+        """Raises StepError NOT_FINITE, or NOT_POSITIVE where a quaternion in x (n) is too short to be one."""
+        if not np.isfinite(x).all():
+            raise StepError(Status.NOT_FINITE)
+        if any(math.hypot(*x[block.numbers]) < _SHORTEST for block in self.rotations):
+            raise StepError(Status.NOT_POSITIVE)
 
     def around(self, x: Vector) -> Numbers:
         """x [+] d as numbers of the variables d (k) at 0."""

@@ -56,8 +56,9 @@ class SensorModel:
     """One sensor of a spec.
 
     Attributes: name; components: their names; m: how many; space: their errors, as many as there are degrees of
-    freedom; takes_inputs: whether h, R or what they use contain inputs, so that an update needs u; partial: whether an
-    update may be masked; turns: for each component, whether its differences are other than z - h.
+    freedom; own: the names of its inputs; takes_inputs: whether h, R or what they use contain inputs, so that an update
+    needs u; partial: whether an update may be masked; turns: for each component, whether its differences are other than
+    z - h.
     """
 
     def __init__(self, model: Model, sensor: Sensor) -> None:
@@ -67,6 +68,7 @@ class SensorModel:
         self.components = tuple(component.name for component in sensor.components)
         self.m = len(self.components)
         self.space = Manifold(self.components, sensor.rotations)
+        self.own = tuple(entry.name for entry in sensor.inputs)
         self.partial = sensor.partial
         self._h = [model.scope.compile(component.h) for component in sensor.components]
         self._periods = [
@@ -84,20 +86,9 @@ class SensorModel:
         self._Re = model.noise_covariance(in_use(model.spec, sensor.noise, predicted), sensor.noise_covariance)
         self.takes_inputs = bool(_reach(model, sensor) & set(model.inputs))
 
-    def chosen(self, mask: int | Sequence[bool] | None) -> tuple[int, ...]:
-        """The components (indices) that a mask selects, bit i for number i; all without one. A quaternion is in use
-        where all of it is. Raises TypeError for a sensor that takes no mask."""
-        if mask is None:
-            return tuple(range(self.m))
-        if not self.partial:
-            raise TypeError(f"sensor {self.name} takes no mask")
-        if isinstance(mask, int | np.integer):
-            return self.space.whole([i for i in range(self.m) if int(mask) >> i & 1])
-        return self.space.whole([i for i, bit in enumerate(mask) if bit])
-
     def predict(self, x: Sequence[Number], e: Sequence[Number], context: Context, used: Sequence[int]) -> list[Number]:
         """h of the components in use at the state x (nx) and the noise inputs e."""
-        environment = self.model.environment(context, x, dict(zip(self._noises, e, strict=True)))
+        environment = self.model.environment(context, x, dict(zip(self._noises, e, strict=True)), self.own)
         return [self._h[i](environment) for i in used]
 
     def linearise(self, x: Vector, reading: Reading, learnt: bool = False) -> Linearisation:
@@ -120,11 +111,12 @@ class SensorModel:
 
     def noise(self, x: Vector, context: Context, used: Sequence[int] | None = None) -> Matrix:
         """R (k, k) of the components in use at x (nx), without the noise inputs."""
-        return self._R(self.model.environment(context, x), None if used is None else self.space.rows(used))
+        rows = None if used is None else self.space.rows(used)
+        return self._R(self.model.environment(context, x, own=self.own), rows)
 
     def input_covariance(self, x: Vector, context: Context) -> Matrix:
         """The covariance of the sensor's noise inputs at x (nx)."""
-        return self._Re(self.model.environment(context, x))
+        return self._Re(self.model.environment(context, x, own=self.own))
 
     def jacobian(self, x: Vector, reading: Reading) -> Matrix:
         """H (k, n) of the components in use at x (nx); may be NaN."""
@@ -164,7 +156,7 @@ class SensorModel:
         wrapped: the components that are, if not all. An own residual may use x (nx) as h does. Raises StepError
         NOT_FINITE.
         """
-        environment = self.model.environment(reading.context, x)
+        environment = self.model.environment(reading.context, x, own=self.own)
         y = reading.space.difference(z, h)
         for block in reading.space.blocks:
             i, k = reading.used[block.number], block.error

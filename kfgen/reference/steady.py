@@ -107,7 +107,9 @@ class Steady(Ekf):
             now, context = Context(model.values, u, at, 0.0), Context(model.values, u, at, dt)
             try:
                 with np.errstate(all="ignore"):
-                    readings = [Reading(s, np.zeros(s.m), tuple(range(s.m)), now) for s in sensors]
+                    given = [replace(now, own=np.full(len(s.own), at)) for s in sensors]
+                    pairs = zip(sensors, given, strict=True)
+                    readings = [Reading(s, np.zeros(s.m), tuple(range(s.m)), each) for s, each in pairs]
                     linear = [each.sensor.linearise(x, each) for each in readings]
                     return self.process.linearise(x, context), linear
             except StepError:

@@ -63,7 +63,7 @@ class Ukf(Algorithm):
         x = estimate.x
         noise = self.process.disturbance(x, context, self._carried)
         cloud = self.drawing.draw(x, estimate.P, noise.carried)
-        images, points, flags = self._images(cloud, context)
+        images, flags = self._images(cloud, context)
         space = self.model.space
         mean = space.moved(images.base, images.d)
         images = images.moved(space.turned(images.d))
@@ -78,16 +78,17 @@ class Ukf(Algorithm):
         stored, P, more = self.limits.finish(mean, P, context)
         kept = None
         if self.keeps and not more:  # points that a floor or ceiling contradicts are none of this estimate
-            # angles of points near the mean that is stored, which was wrapped
+            # what is kept are deviations, as seen from the mean: numbers lie where f left them, rotations where these
+            # lead from the mean; angles near the mean that is stored, which was wrapped
             turn = np.array([stored[i] - mean[i] if i in self.model.periods else 0.0 for i in range(len(mean))])
+            points = np.array([space.moved(mean, deviation) for deviation in images.deviations])
             kept = Cloud(points + turn, np.zeros((len(images.e), 0)), images)
         return replace(estimate, x=stored, P=P, memory=kept), flags | gone | more
 
-    def _images(self, cloud: Cloud, context: Context) -> tuple[Images, Matrix, Status]:
-        """f at the points, within the bounds, and where they lie (N, nx), angles near that of the centre.
+    def _images(self, cloud: Cloud, context: Context) -> tuple[Images, Status]:
+        """f at the points, within the bounds; those that are rejected replaced by f at the centre.
 
-        Those that are rejected are replaced by f at the centre. A set without a point at the mean has f evaluated
-        there beside, if something turns. Raises NOT_FINITE.
+        A set without a point at the mean has f evaluated there beside, if something turns. Raises NOT_FINITE.
         """
         raw, model = [], self.model
         for point, values in zip(cloud.points, cloud.noise, strict=True):
@@ -108,8 +109,7 @@ class Ukf(Algorithm):
         e = np.array([model.space.difference(model.clip(image), base) for image in raw])
         for i in self._wrapped:
             e[:, i] = [wrap(float(difference), model.turns[i]) for difference in e[:, i]]
-        points = np.array([model.space.moved(base, difference) for difference in e])
-        return Images(cloud.weights, base, e, cloud.weights.wm @ e), points, flags
+        return Images(cloud.weights, base, e, cloud.weights.wm @ e), flags
 
     def _rejected(self, image: Vector, context: Context) -> bool:
         """Whether the spec rejects the image (nx) of a point, as f left it; t is that of the step's start."""

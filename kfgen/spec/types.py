@@ -151,6 +151,7 @@ class Initialize:
     variance: Mapping[str, Expression] = field(default_factory=dict)
     let: tuple[Definition, ...] = ()  # what the expressions share, each using only those before it
     place: Place = NOWHERE
+    waits: bool = False  # one of a list: predictions and all else wait until every named sensor has come
 
 
 @dataclass(frozen=True)
@@ -202,6 +203,11 @@ class Sensor:
     rotations: tuple[Rotation, ...] = ()  # components that are quaternions
     doc: str = ""
     place: Place = NOWHERE
+
+    @property
+    def fields(self) -> tuple[Component | Input, ...]:
+        """All numbers of a measurement, in the order of the sensor's struct: its components, then its inputs."""
+        return (*self.components, *self.inputs)
 
     @property
     def errors(self) -> tuple[str, ...]:

@@ -101,14 +101,14 @@ def test_every_spec_passes_on_an_emulated_board(everything, needs, board):
 
 
 def test_every_spec_passes_on_an_emulated_avr(everything, needs):
-    """Constants stay in flash. A double has four bytes there, with which the receiver's position cannot be told."""
+    """Constants stay in flash. A double has four bytes there, with which a receiver's position cannot be told."""
     needs(*BOARDS["avr"].tools)
     folder = everything("own")
     names = [path.stem for path in SPECS]
     for part in (names[::2], names[1::2]):  # its flash does not hold all of them
         _write_tests(folder, part)
         files = [f"{name}{end}.c" for name in part for end in ("", "_selftest")]
-        failed = 1 << part.index("gps") if "gps" in part else 0
+        failed = sum(1 << part.index(name) for name in ("gps", "gnss") if name in part)
         assert BOARDS["avr"].status(folder, [*files, "tests.c"], "-Os") == failed
     data = run(folder, "avr-size", "-A", "program.elf").stdout
     used = sum(int(size) for name, size in re.findall(r"^\.(data|bss)\s+(\d+)", data, re.MULTILINE))

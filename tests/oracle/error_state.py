@@ -65,9 +65,10 @@ def matrix(q):
 def right_jacobian(d):
     """d log(exp(-d) exp(d + e))/de (Sola 2017, equation 183)."""
     angle = np.linalg.norm(d)
-    if angle < 1e-5:
-        return np.eye(3) - skew(d) / 2 + skew(d) @ skew(d) / 6
-    a, b = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+    if angle < 0.05:
+        a, b = 1 / 2 - angle**2 / 24 + angle**4 / 720, 1 / 6 - angle**2 / 120 + angle**4 / 5040
+    else:
+        a, b = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     return np.eye(3) - a * skew(d) + b * skew(d) @ skew(d)
 
 
@@ -192,44 +193,55 @@ class ErrorState:
 
     # --- sigma points (merwe)
 
-    def points(self, root, alpha, beta, kappa):
-        n = self.space.k
+    def points(self, root, alpha, beta, kappa, noise=None):
+        """Columns of the errors, and of the noises where their covariance is given."""
+        P, n = self.P, self.space.k
+        roots = root(P)
+        if noise is not None:
+            n += len(noise)
+            roots = np.block([[roots, np.zeros((len(P), len(noise)))], [np.zeros((len(noise), len(P))), root(noise)]])
         self.lam = alpha**2 * (n + kappa) - n
         gamma = np.sqrt(n + self.lam)
         self.wm = np.full(2 * n + 1, 0.5 / (n + self.lam))
         self.wc = self.wm.copy()
         self.wm[0] = self.lam / (n + self.lam)
         self.wc[0] = self.wm[0] + 1 - alpha**2 + beta
-        S = gamma * root(self.P)
+        S = gamma * roots
         return [np.zeros(n), *S.T, *(-S.T)]
 
-    def predict_points(self, u, dt, root, weights):
+    def predict_points(self, u, dt, root, weights, augment=False):
+        """augment: with the noises as dimensions of the points, else by their Jacobian."""
         space, x, none = self.space, self.x, np.zeros(len(self.Qw))
-        offsets = self.points(root, *weights)
-        images = [space.unit(self.f(space.plus(x, d), none, u, dt)) for d in offsets]
+        offsets = self.points(root, *weights, noise=self.Qw if augment else None)
+        images = [space.unit(self.f(space.plus(x, d[: space.k]), d[space.k :] if augment else none, u, dt))
+                  for d in offsets]  # fmt: skip
         around = np.array([space.minus(image, images[0]) for image in images])
         mean = self.wm @ around
         spread = around - mean
         T = space.reset(mean)
         G = derivative(lambda w: space.minus(self.f(x, w, u, dt), self.f(x, none, u, dt)), len(self.Qw))
         self.x = space.unit(space.plus(images[0], mean))
-        self.P = T @ (self.wc * spread.T) @ spread @ T.T + self.Q + G @ self.Qw @ G.T
-        self.kept = images, spread @ T.T
+        self.P = T @ (self.wc * spread.T) @ spread @ T.T + self.Q
+        self.P += 0 if augment else G @ self.Qw @ G.T
+        self.kept = spread @ T.T
 
-    def update_points(self, z, h, R, root, weights, reset=True, measured=None, kept=False):
-        """With points drawn anew, or with those that predict has left."""
+    def update_points(self, z, h, R, root, weights, reset=True, measured=None, kept=False, sequential=False):
+        """With points drawn anew, or with those that predict has left; sequential: as a linear measurement by
+        regression, without what the regression leaves."""
         space = self.space
         measured = measured or Space(len(z), ())
-        offsets = np.array(self.points(root, *weights))
-        at, offsets = self.kept if kept else ([space.plus(self.x, d) for d in offsets], offsets)
-        images = [h(point) for point in at]
+        offsets = self.kept if kept else np.array(self.points(root, *weights))
+        images = [h(space.plus(self.x, d)) for d in offsets]
         around = np.array([measured.minus(image, images[0]) for image in images])
         mean = self.wm @ around
         T = measured.reset(mean)
         spread = (around - mean) @ T.T
         y = measured.minus(np.asarray(z, float), measured.plus(images[0], mean))
+        cross = (self.wc * offsets.T) @ spread
         S = (self.wc * spread.T) @ spread + R
-        K = (self.wc * offsets.T) @ spread @ np.linalg.inv(S)
+        if sequential:
+            S = cross.T @ np.linalg.solve(self.P, cross) + R
+        K = cross @ np.linalg.inv(S)
         d = K @ y
         self.x = space.unit(space.plus(self.x, d))
         T = space.reset(d) if reset else np.eye(space.k)

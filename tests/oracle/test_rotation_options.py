@@ -16,6 +16,7 @@ from tests.oracle.attitude import ERRORS, expression, sensor, star, turning
 from tests.oracle.error_state import (
     ErrorState,
     Space,
+    cholesky,
     compose,
     exp,
     left_jacobian,
@@ -23,7 +24,7 @@ from tests.oracle.error_state import (
     matrix,
     right_jacobian,
 )
-from tests.oracle.formulas import formula, quaternion, unrotate
+from tests.oracle.formulas import formula, product, quaternion, unrotate
 
 Q = quaternion("q")
 GYRO = ("gyro_x", "gyro_y", "gyro_z")
@@ -321,3 +322,26 @@ def test_a_ukf_of_sixty_degrees_is_nearly_honest(error):
     assert nees(full()) > 7
     for covariance, sequential in (("full", False), ("ud", True)):
         assert nees(replace(inertial.ukf(covariance, sequential=sequential), sigma_points=points)) < 5
+
+
+@BOTH
+@pytest.mark.parametrize("seen", ["body", "reference"])
+@pytest.mark.parametrize("kind", ["ekf", "ukf"])
+def test_a_camera_mounted_anywhere(error, seen, kind):
+    """h = world q mount, seen with either error."""
+    world, mount = exp(np.array([0.3, -2.0, 0.4])), exp(np.array([1.0, 0.2, -0.7]))
+    h = product(product([formula(float(v)) for v in world], Q), [formula(float(v)) for v in mount])
+    chosen = full() if kind == "ekf" else inertial.ukf("full")
+    kf = kfgen.reference(tracker(error, chosen, sensors=(star(h, SEEN, seen),)))
+    other = ErrorState(Space(4, (0,), error), START, np.diag(np.square(STD)), None, np.zeros((3, 3)), np.zeros((0, 0)))
+    for k in range(4):
+        z = compose(compose(world, off(error, 0.7 * k * TURN)), mount)
+        assert kf.update("star", (-1) ** k * z) == 0
+        given = z, lambda x: compose(compose(world, x), mount), np.diag(SEEN**2)
+        if kind == "ekf":
+            nis = other.update(*given, measured=Space(4, (0,), seen))
+        else:
+            nis = other.update_points(*given, cholesky, inertial.WEIGHTS, measured=Space(4, (0,), seen))
+        assert kf.nis == pytest.approx(nis, rel=1e-9)
+        assert np.allclose(kf.x, other.x, rtol=0, atol=1e-13)
+        assert np.allclose(kf.P, other.P, rtol=0, atol=1e-14)

@@ -11,10 +11,11 @@ import pytest
 import kfgen
 from kfgen.reference.model import Context, Model
 from kfgen.reference.process import Process
+from kfgen.simulate import simulate
 from kfgen.spec.types import Filter
 from tests.oracle import inertial
 from tests.oracle.attitude import ERRORS, PARTS, expression, sensor, star, turning
-from tests.oracle.error_state import compose, exp, inverse, log, matrix
+from tests.oracle.error_state import Space, compose, exp, inverse, log, matrix
 from tests.oracle.formulas import F, formula, product, quaternion, turned_by, unrotate, vector
 
 Q = quaternion("q")
@@ -217,3 +218,22 @@ def test_a_quaternion_without_dynamics_stays():
     assert kf.predict() == 0
     assert np.array_equal(kf.x, [0, 1, 0, 0])
     assert np.allclose(kf.P, np.diag([0.01, 0.04, 0.59]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in FILTERS if kind != "kept"])  # kept points lack Q
+@BOTH
+def test_what_is_simulated_is_what_the_filter_expects(kind, error):
+    """Errors are drawn where they live: NEES and NIS of every filter are about 1 per degree of freedom."""
+    spec = attitude(FILTERS[kind], error=error, std=(0.2, 0.02, 0.3), Q={"q_rx": 1e-3, "q_rz": 1e-5})
+    kf, nees, nis = kfgen.reference(spec), [], []
+    for seed in range(12):
+        log = simulate(spec, 25, seed=seed).columns
+        kf.init()
+        for k in range(25):
+            assert kf.predict([log[name][k] for name in GYRO]) == 0
+            assert kf.update("star", [log[f"star.{name}"][k] for name in PARTS]) == 0
+            nis.append(kf.nis)
+            e = Space(4, (0,), error).minus(np.array([log[f"true.{name}"][k] for name in PARTS]), kf.x)
+            nees.append(e @ np.linalg.solve(kf.P, e))
+    assert np.mean(nis) == pytest.approx(3.0, abs=0.5)
+    assert np.mean(nees) == pytest.approx(3.0, abs=0.8)

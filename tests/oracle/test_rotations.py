@@ -86,3 +86,20 @@ def test_ukf(error, covariance, redraw):
         fresh[0] = False
 
     assert follow(kf, other, update, inertial.SENSORS, 120, predict) < 1e-8
+
+
+@BOTH
+@pytest.mark.parametrize("augment", [True, False])
+@pytest.mark.parametrize("reset", [True, False])
+def test_ukf_one_by_one_and_with_noise_in_its_points(error, augment, reset):
+    chosen = inertial.ukf("ud", sequential=True, augment=augment)
+    kf, other = kfgen.reference(inertial.spec(error, reset, chosen, star=error)), inertial.textbook(error)
+
+    def predict(u, dt):
+        other.predict_points(u, dt, upper, inertial.WEIGHTS, augment)
+
+    def update(name, z):
+        h, R = inertial.SENSORS[name]
+        other.update_points(z, h, R, upper, inertial.WEIGHTS, reset, measured(name, error), sequential=True)
+
+    assert follow(kf, other, update, inertial.SENSORS, 60, predict) < 1e-8

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from kfgen.filters.algebra.linalg import dot
+from collections.abc import Mapping
+from fractions import Fraction
+
+from kfgen.filters.algebra.linalg import Rows, dot, plus, times
 from kfgen.filters.algebra.numbers import Number, select
 from kfgen.filters.bank.mixing import spread
 from kfgen.filters.bank.mode import Mode
 from kfgen.filters.bank.trace import BankTrace
 from kfgen.filters.base import CONST_KF, KF
 from kfgen.filters.steps.covariance import covariance_argument
+from kfgen.filters.steps.outputs import outputs_function
 from kfgen.filters.steps.resetting import seen_at
 from kfgen.geometry import heaviest
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
-from kfgen.ir.trace import Array, Value
+from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
 
 
 class BankCovariance:
-    """Traces set_covariance and get_covariance. outdated: as in CovarianceCode, of all modes."""
+    """Traces set_covariance, get_covariance and get_outputs. outdated: as in CovarianceCode, of all modes."""
 
     def __init__(self, model: Model, modes: list[Mode], outdated: tuple[str, ...]) -> None:
         self.model = model
@@ -110,6 +114,38 @@ class BankCovariance:
                         own[k * step + a * start] = t.value(dot([J[a][b] for b in index], list(old)))
         with t.loop("k", 0, n * n) as k:
             t.store("P", k, t.element("P", k) + m * own[k])
+    def isolate(self, t: Trace, variances: Mapping[int, Value]) -> None:
+        """As a filter by itself does, in every mode."""
+        assert isinstance(t, BankTrace)
+        for mode in self.modes:
+            with t.of(mode.scope()):
+                mode.filter.isolate(t, variances)
+
+    def outputs(self, taken: frozenset[str], smallest: Fraction) -> list[Function]:
+        """What tells the outputs, where there are some."""
+        if not self.model.outputs:
+            return []
+        t = BankTrace(smallest)
+        return [outputs_function(t, self.model, lambda J: self._variances(t, J), taken)]
+
+    def _variances(self, t: BankTrace, J: Rows) -> list[Number]:
+        """The diagonal of J P J^T (k,), of P = sum of mu_i (P_i + d_i d_i^T)."""
+        mu = [t.name(t.element("kf.mu", i), f"mu_{mode.name}") for i, mode in enumerate(self.modes)]
+        totals: list[Number] = [0] * len(J)
+        deviations = self._deviations(t, mu)
+        for mode, m, d in zip(self.modes, mu, deviations, strict=True):
+            with t.of(mode.scope()):
+                seen = J
+                if self.model.rotations:  # by an error at the mode's own attitude
+                    T = seen_at(t, self.model, list(range(self.n)), [d[i] for i in range(self.n)])
+                    columns = list(zip(*T, strict=True))
+                    seen = [[t.value(dot(row, list(column))) for column in columns] for row in J]
+                own = mode.filter.variances(t, seen)
+                apart = [dot(row, [d[i] for i in range(self.n)]) for row in J]
+                totals = [
+                    plus(total, times(m, plus(v, times(a, a)))) for total, v, a in zip(totals, own, apart, strict=True)
+                ]
+        return totals
 
     def _deviations(self, t: BankTrace, mu: list[Value]) -> list[Array]:
         """x of each mode less the mean; periodic states about the mode of the largest probability."""

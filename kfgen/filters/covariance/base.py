@@ -56,6 +56,13 @@ class Form(Protocol[P]):
         """Store a covariance given as the upper triangle of P and of its factors (D on the diagonal, U above)."""
         ...
 
+    def isolate(self, t: Trace, variances: Mapping[int, Value], in_loops: bool) -> None:
+        """Store for some states, by their inner places, variances of their own, at least 0, and no correlations.
+
+        in_loops: by a private function, where there is one for it.
+        """
+        ...
+
     def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
         """Further functions of the filter that this form offers. outdated: as in CovarianceCode."""
         ...

@@ -81,7 +81,7 @@ def _seen(model: Model, sensor: SensorModel, turning: bool = True) -> list[Dual]
     if not turning:
         x |= held_attitudes(t, model)
     noises = cloud.symbolic_noises(t, [w.name for w in sensor.noises])
-    duals = {**x, **noises, **process.parameters_and_inputs(t, model)}
+    duals = {**x, **noises, **process.parameters_and_inputs(t, model, sensor=sensor)}
     if "t" in used:
         duals["t"] = process.time_now(t, model)
     if model.dt is not None:

@@ -14,8 +14,9 @@ import sympy
 from kfgen.filters.algebra.dual import Dual, Evaluator
 from kfgen.filters.algebra.linalg import Vector, plus, times
 from kfgen.filters.algebra.numbers import is_zero, select
-from kfgen.filters.base import CONST_KF, INPUTS
+from kfgen.filters.base import CONST_KF, INPUTS, sensor_argument
 from kfgen.filters.sigma.points import PointSet
+from kfgen.filters.sigma.turned import point
 from kfgen.filters.steps import process
 from kfgen.filters.steps.sensor import predicted_attitude
 from kfgen.geometry.part import Part
@@ -35,7 +36,7 @@ class Private:
     """A private function and what it is given beside its arrays."""
 
     function: Function
-    given: list[str]  # of kf, u, step
+    given: list[str]  # of kf, u, z, step
 
     def arguments(self, step: Value | None) -> list[str | Value]:
         out: list[str | Value] = []
@@ -48,8 +49,8 @@ class Private:
         return out
 
 
-def given_for(body: list[Statement]) -> list[Argument]:
-    """What a scheduled body reads of the filter, the inputs and the step."""
+def given_for(body: list[Statement], sensor: SensorModel | None = None) -> list[Argument]:
+    """What a scheduled body reads of the filter, the inputs, a measurement of the sensor, and the step."""
     read: set[str] = set()
     for statement in walk(body):
         if isinstance(statement, Call):
@@ -60,13 +61,21 @@ def given_for(body: list[Statement]) -> list[Argument]:
             if node.op in ("field", "element"):
                 read.add(str(node.data).partition(".")[0])
             stack += node.args
-    return [a for a in (CONST_KF, INPUTS, _STEP) if a.name in read]
+    measured = [] if sensor is None or not sensor.inputs else [sensor_argument(sensor.name)]
+    return [a for a in (CONST_KF, INPUTS, *measured, _STEP) if a.name in read]
 
 
-def _duals(t: Trace, model: Model, x: list[Value], noises: dict[str, Value], used: set[str]) -> dict[str, Dual]:
+def image(sensor: SensorModel) -> str:
+    """The name of an array of what is measured at a point: z, where that is not the measurement itself."""
+    return "seen_z" if sensor.inputs else "z"
+
+
+def _duals(
+    t: Trace, model: Model, x: list[Value], noises: dict[str, Value], used: set[str], sensor: SensorModel | None = None
+) -> dict[str, Dual]:
     duals = {name: Dual(value) for name, value in zip(model.states, x, strict=True)}
     duals.update({name: Dual(value) for name, value in noises.items()})
-    duals.update(process.parameters_and_inputs(t, model))
+    duals.update(process.parameters_and_inputs(t, model, sensor=sensor))
     if "t" in used:
         duals["t"] = process.time_now(t, model)
     if model.dt is not None:
@@ -120,7 +129,7 @@ def turning_dynamics(model: Model, images: Space, carried: tuple[str, ...], take
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("e", n + k), name)
     start = [t.element("start", i) for i in range(len(model.states))]
-    x = point(t, model, start, [t.element("e", i) for i in range(n)])
+    x = point(model, start, [t.element("e", i) for i in range(n)])
     x = [clipped(t, value, bounds) for value, bounds in zip(x, model.bounds, strict=True)]
     for value, name in zip(x, model.states, strict=True):
         if name in used:
@@ -138,19 +147,11 @@ def turning_dynamics(model: Model, images: Space, carried: tuple[str, ...], take
     return private("f", body, arrays, "e <- f(start [+] e, u, w) [-] centre, in place")
 
 
-def point(t: Trace, model: Model, x: list[Value], d: list[Value]) -> list[Value]:
-    """x [+] d; angles may leave their chart."""
-    out = list(x)
-    for i, j, _ in model.space.singles:
-        out[i] = x[i] + d[j]
-    for i, j, rotation in model.space.rotations:
-        out[i : i + 4] = rotation.retract(x[i : i + 4], d[j : j + 3])
-    return out
-
-
-def private(name: str, body: list[Statement], arrays: list[Argument], doc: str) -> Private:
+def private(
+    name: str, body: list[Statement], arrays: list[Argument], doc: str, sensor: SensorModel | None = None
+) -> Private:
     """A private function that is given what its body reads, and arrays."""
-    arguments = given_for(body)
+    arguments = given_for(body, sensor)
     function = Function(name, [*arguments, *arrays], body, doc, returns="void", private=True)
     return Private(function, [a.name for a in arguments])
 
@@ -162,20 +163,21 @@ def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], tak
     noises = {w.name: t.zero for w in sensor.noises}
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("x", n + k), name)
-    evaluator = Evaluator(t, model, _duals(t, model, _state(t, model, used), noises, used))
+    evaluator = Evaluator(t, model, _duals(t, model, _state(t, model, used), noises, used, sensor))
+    name = image(sensor)
     turning = {r.first + k for r in sensor.rotations for k in range(4)}
     z: list[Dual] = []
     for i, e in enumerate(sensor.h):
         z.append(Dual(evaluator.value(e)))
         if i not in turning:
-            t.store("z", i, z[i].value)
+            t.store(name, i, z[i].value)
     for r in sensor.rotations:
         for k, value in enumerate(predicted_attitude(evaluator, sensor, r, z).q):
-            t.store("z", r.first + k, value)
+            t.store(name, r.first + k, value)
     point = Argument("x", "{name}_real_t", pointer=True, size=n + len(carried))
-    out = Argument("z", "{name}_real_t", pointer=True, constant=False, size=len(sensor.h))
-    body = schedule(t, taken | {"kf", "u", "x", "z"})
-    return private(f"h_{sensor.name}", body, [point, out], f"what {sensor.name} measures at x")
+    out = Argument(name, "{name}_real_t", pointer=True, constant=False, size=len(sensor.h))
+    body = schedule(t, taken | {"kf", "u", "x", "z", name})
+    return private(f"h_{sensor.name}", body, [point, out], f"what {sensor.name} measures at x", sensor)
 
 
 def fill(t: Trace, cloud: Array, points: PointSet, columns: list[Vector], step: int = 1) -> None:
@@ -218,7 +220,7 @@ def difference(
     residual = sensor.residual[i]
     if residual is not None:
         name = sensor.spec.components[i].name
-        evaluator = Evaluator(t, model, _duals(t, model, x, {w.name: t.zero for w in sensor.noises}, used))
+        evaluator = Evaluator(t, model, _duals(t, model, x, {w.name: t.zero for w in sensor.noises}, used, sensor))
         evaluator.bind(sympy.Symbol(f"z_{name}"), z)
         evaluator.bind(sympy.Symbol(f"h_{name}"), base)
         return evaluator.value(residual)

@@ -19,7 +19,7 @@ from kfgen.filters.sigma.carried import images_of_sensor
 from kfgen.filters.sigma.cloud import Private
 from kfgen.filters.sigma.drawing import Drawing, noise_root
 from kfgen.filters.sigma.points import PointSet
-from kfgen.filters.sigma.turned import Seen, mean_of, seen_spread
+from kfgen.filters.sigma.turned import Seen, mean_of, point, seen_spread
 from kfgen.filters.steps.sensor import Linearised, SensorCode, total
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
@@ -96,17 +96,17 @@ class Seeing:
         t = Trace()
         x = [t.name(t.element("x", i), name) for i, name in enumerate(model.states)]
         numbers = len(model.states)
-        point, z = t.array("point", numbers + self.q), t.array("z", len(sensor.h))
+        at_point, z = t.array("point", numbers + self.q), t.array(cloud.image(sensor), len(sensor.h))
         store = None if points.theta == 0 else t.array("dz", len(points.rows) * m)
         call = self.h.arguments(None)
         middle = [t.zero] * n
         if self.recalls and points.centre:
             middle = [t.name(t.element("middle", i), f"{name}_middle") for i, name in enumerate(model.errors)]
-        for i, value in enumerate(cloud.point(t, model, x, middle)):
-            point[i] = value
+        for i, value in enumerate(point(model, x, middle)):
+            at_point[i] = value
         for i in range(self.q):
-            point[numbers + i] = t.zero
-        t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
+            at_point[numbers + i] = t.zero
+        t.call(self.h.function, [*call, ("point", 0), (z.name, 0)])
         names = list(sensor.errors)
         base = [t.name(z[a], f"{c.name}_centre") for a, c in enumerate(sensor.spec.components)]
         shift = [t.variable(f"shift_{name}", 0) for name in names]
@@ -120,9 +120,9 @@ class Seeing:
         with t.loop("k", 0, len(points.rows)) as k:
             at = k * self.stride
             own = [t.element("cloud", at + i) for i in range(self.stride)]
-            for i, value in enumerate([*cloud.point(t, model, x, own[:n]), *own[n:]]):
-                point[i] = value
-            t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
+            for i, value in enumerate([*point(model, x, own[:n]), *own[n:]]):
+                at_point[i] = value
+            t.call(self.h.function, [*call, ("point", 0), (z.name, 0)])
             apart = [t.zero] * m
             for i, j, single in self.images.singles:
                 apart[j] = cloud.difference(t, model, sensor, single, i, z[i], base[i], x)
@@ -182,9 +182,9 @@ class Seeing:
         sizes = [("x", numbers, True), *([("middle", n, True)] if self.recalls and points.centre else []),
                  ("cloud", len(points.rows) * self.stride, True), ("seen", self.size, False)]  # fmt: skip
         arrays = [Argument(name, "{name}_real_t", pointer=True, constant=c, size=s) for name, s, c in sizes]
-        body = schedule(t, taken | {"kf", "u", "x", "z", "middle", "cloud", "seen"})
+        body = schedule(t, taken | {"kf", "u", "x", "z", z.name, "middle", "cloud", "seen"})
         doc = f"what the points predict of {sensor.name}: mean, covariance, covariances with the state"
-        return cloud.private(f"{'recall' if self.recalls else 'see'}_{sensor.name}", body, arrays, doc)
+        return cloud.private(f"{'recall' if self.recalls else 'see'}_{sensor.name}", body, arrays, doc, sensor)
 
     # in the update -----------------------------------------------------------------------------------
 

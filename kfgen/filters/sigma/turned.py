@@ -1,4 +1,4 @@
-"""What sigma points have seen of a sensor; of measured quaternions means on the group, covariances as seen from there."""
+"""What sigma points see of a sensor; of measured quaternions means on the group, covariances as seen from there."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.geometry import Space, Turn
 from kfgen.ir.trace import Trace, Value
+from kfgen.model import Model
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,16 @@ class Seen:
 
 Entries = dict[tuple[int, int], Value]
 """Entries (a, b), a <= b, of a symmetric matrix."""
+
+
+def point(model: Model, x: list[Value], d: list[Value]) -> list[Value]:
+    """x [+] d; angles may leave their chart."""
+    out = list(x)
+    for i, j, _ in model.space.singles:
+        out[i] = x[i] + d[j]
+    for i, j, rotation in model.space.rotations:
+        out[i : i + 4] = rotation.retract(x[i : i + 4], d[j : j + 3])
+    return out
 
 
 def mean_of(t: Trace, images: Space, base: list[Value], delta: Vector) -> tuple[list[Value], Rows | None]:

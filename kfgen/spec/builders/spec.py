@@ -115,7 +115,7 @@ class Builder:
             sensor = rule.get("from")
             states, variance = (dict(entries(rule.get(key))) for key in ("states", "var"))
             name = sensor.text if isinstance(sensor, Word) else ""
-            found.append(Initialize(name, states, variance, rule.get("let", ()), rule.place))
+            found.append(Initialize(name, states, variance, rule.get("let", ()), rule.place, rule.get("waits", False)))
         return tuple(found)
 
     # --- options

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kfgen.spec.names import check_identifiers, check_name
-from kfgen.spec.rules import compensated, covariance, filters, modes, rotations, structure, values
+from kfgen.spec.rules import compensated, covariance, filters, given, modes, rotations, structure, values
 from kfgen.spec.rules.facts import Facts
 from kfgen.spec.scopes import Scopes
 from kfgen.spec.types import Spec
@@ -24,5 +24,6 @@ def check(walker: Walker, spec: Spec) -> None:
     filters.check(facts)
     modes.check(facts)
     compensated.check(facts)
+    given.check(facts)
     rotations.check(facts)
     check_identifiers(spec, walker.problems)

@@ -129,8 +129,8 @@ def _steady(facts: Facts, imm: Imm) -> None:
 
 
 def _shape(sensors: tuple[Sensor, ...]) -> list[tuple[str, list[str]]]:
-    return [(s.name, [*(c.name for c in s.components), *(i.name for i in s.inputs)]) for s in sensors]
+    return [(sensor.name, [each.name for each in sensor.fields]) for sensor in sensors]
 
 
 def _listed(sensors: tuple[Sensor, ...]) -> str:
-    return "; ".join(f"{s.name}: {', '.join(c.name for c in s.components)}" for s in sensors)
+    return "; ".join(f"{s.name}: {', '.join(each.name for each in s.fields)}" for s in sensors)

@@ -185,6 +185,8 @@ def _sensor(facts: Facts, sensor: Sensor) -> None:
         _ordered(facts, component.range, "range")
         if component.kind == "periodic":
             facts.check_range(component.period, "the period", 0)
+    for each in sensor.inputs:
+        _ordered(facts, each.range, "range")
     facts.check_range(sensor.rate, "the rate", 0)
     if sensor.gate is not None:
         facts.check_range(sensor.gate.probability, "the probability", 0, 1)

@@ -19,7 +19,10 @@ class StartShaper:
     def initialize(self, raw: Any, components: dict[str, dict[str, Shaped]]) -> Any:
         """A mapping, or a list of them; always a list from here on."""
         rules = raw if isinstance(raw, tuple) else (raw,)
-        return tuple(self._rule(rule, components) for rule in rules if isinstance(rule, Fields))
+        found = tuple(self._rule(rule, components) for rule in rules if isinstance(rule, Fields))
+        for rule in found:
+            rule.values["waits"] = isinstance(raw, tuple)
+        return found
 
     def _rule(self, raw: Fields, components: dict[str, dict[str, Shaped]]) -> Fields:
         sensor = raw.get("from")

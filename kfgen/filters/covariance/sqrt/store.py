@@ -5,15 +5,17 @@ Inside, the states are in reverse order: S is then upper triangular, and the ker
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra.factors import udu
-from kfgen.filters.algebra.numbers import constant_root, select, sqrt
-from kfgen.filters.algebra.triangles import upper_start
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.numbers import assume_nonnegative, constant_root, reciprocal, select, sqrt
+from kfgen.filters.algebra.triangles import upper, upper_start
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.definite import Definite
-from kfgen.filters.covariance.kernels.function import integer
+from kfgen.filters.covariance.kernels.function import Kernels, integer
+from kfgen.filters.covariance.kernels.isolate import isolate_root
 from kfgen.filters.covariance.names import entry
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
@@ -112,6 +114,32 @@ class SqrtStore(Definite):
             if self.n > 1:
                 with t.loop("i", 0, j) as i:
                     t.store("kf.S", self.place(i, j), factors[upper_start(j) + i] * root)
+
+    def isolate(self, t: Trace, variances: Mapping[int, Value], in_loops: bool) -> None:
+        """See `kernels.isolate`."""
+        n = self.n
+        if in_loops:
+            kernel = isolate_root(Kernels(Fraction(t.smallest), frozenset()), n)
+            for place, variance in variances.items():
+                t.call(kernel, [("kf.S", 0), integer(t, n - 1 - place), variance])
+            return
+        S: Rows = [[t.element("kf.S", upper(j, i)) if j <= i else t.zero for j in range(n)] for i in range(n)]
+        for inner, variance in variances.items():
+            own = n - 1 - inner
+            w: Vector = [S[i][own] for i in range(n)]
+            for i in range(n):
+                S[i][own] = S[own][i] = t.zero
+            S[own][own] = sqrt(assume_nonnegative(variance))
+            for j in range(own + 1, n):
+                d, s = S[j][j], w[j]
+                r = t.value(sqrt(d * d + s * s))
+                some, inverse = reciprocal(r)
+                c, s, S[j][j] = select(some, d * inverse, 1), s * inverse, r
+                for i in range(j + 1, n):
+                    S[i][j], w[i] = c * S[i][j] + s * w[i], c * w[i] - s * S[i][j]
+        for i in range(n):
+            for j in range(i + 1):
+                t.store("kf.S", upper(j, i), t.value(S[i][j]))
 
     def root_array(self, t: Trace, own: Array | None = None) -> Array:
         """The columns of S, one after another. own: an array in place of the field."""

@@ -6,10 +6,14 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra.factors import udu
+from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_nonnegative, sqrt
-from kfgen.filters.algebra.triangles import strict_size, strict_start, upper_start
+from kfgen.filters.algebra.rank_one import rank_one
+from kfgen.filters.algebra.triangles import strict, strict_size, strict_start, upper_start
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.definite import Definite
+from kfgen.filters.covariance.kernels.function import Kernels, integer
+from kfgen.filters.covariance.kernels.isolate import isolate
 from kfgen.filters.covariance.names import entries, entry
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
@@ -62,6 +66,31 @@ class UDStore(Definite):
                 with t.loop("i", 0, j) as i:
                     t.store("kf.U", strict_start(j) + i, factors[upper_start(j) + i])
             t.store("kf.D", j, factors[upper_start(j) + j])
+
+    def isolate(self, t: Trace, variances: Mapping[int, Value], in_loops: bool) -> None:
+        """See `kernels.isolate`."""
+        n = self.n
+        if in_loops and n > 1:
+            kernel = isolate(Kernels(Fraction(t.smallest), frozenset()), n)
+            for place, variance in variances.items():
+                t.call(kernel, [("kf.U", 0), ("kf.D", 0), integer(t, place), variance])
+            return
+        U: Rows = [[t.element("kf.U", strict(i, j)) if i < j else t.zero for j in range(n)] for i in range(n)]
+        D: Vector = [assume_nonnegative(t.element("kf.D", j)) for j in range(n)]
+        for place, variance in variances.items():
+            column, weight = [U[i][place] for i in range(place)], D[place]
+            D[place] = assume_nonnegative(variance)
+            for i in range(n):
+                U[i][place] = U[place][i] = t.zero
+            leading, pivots = [row[:place] for row in U[:place]], D[:place]
+            rank_one(leading, pivots, [(column, weight, -1)], safe=True)
+            D[:place] = pivots
+            for row, new in zip(U, leading, strict=False):
+                row[:place] = new
+        for j in range(n):
+            for i in range(j):
+                t.store("kf.U", strict(i, j), t.value(U[i][j]))
+            t.store("kf.D", j, t.value(D[j]))
 
     def root_array(self, t: Trace, own: Mapping[str, Array] | None = None) -> Array:
         """The columns of U sqrt(D), one after another. own: arrays in place of the fields."""
