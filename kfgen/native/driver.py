@@ -16,8 +16,8 @@ def declarations(name: str) -> str:
     return f"size_t {name}_kfgen_size(void);\n{_signature(name)};\n"
 
 
-def source(spec: Spec, declared: Declarations) -> str:
-    """The driver's C text for a filter; its functions are called with what they take."""
+def source(spec: Spec, declared: Declarations, history: bool = False) -> str:
+    """The driver's C text for a filter, with its past or without; its functions are called with what they take."""
     name = spec.name
     sensors, first = [], 0
     for sensor in spec.measurements:
@@ -48,6 +48,7 @@ def source(spec: Spec, declared: Declarations) -> str:
         covariance=declared.has("get_covariance"),
         modes=len(spec.imm.modes) if spec.imm else 0,
         compensated=spec.code.compensated,
+        history=history,
     )
 
 

@@ -223,6 +223,17 @@ class Code:
 
 
 @dataclass(frozen=True)
+class History:
+    """Measurements may arrive up to `steps` predictions late, `per_step` of one step; each `keep`-th state is kept."""
+
+    steps: int
+    per_step: int = 4
+    keep: int = 1
+    place: Place = NOWHERE
+    places: Mapping[str, Place] = field(default_factory=dict)  # of the keys that were written
+
+
+@dataclass(frozen=True)
 class Mode:
     """One mode of an imm; every field is complete (top-level keys that the mode does not replace are filled in)."""
 
@@ -272,6 +283,7 @@ class Spec:
     fixed: Fixed = Fixed()
     code: Code = Code()
     imm: Imm | None = None
+    history: History | None = None
     advice: tuple[str, ...] = ()  # names of the advice that is not wanted
     place: Place = NOWHERE
     places: Mapping[str, Place] = field(default_factory=dict)  # of the top-level keys that were written

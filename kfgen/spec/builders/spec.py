@@ -11,7 +11,7 @@ from kfgen.spec.constants import keep
 from kfgen.spec.problems import short
 from kfgen.spec.raw import Fields, Word, entries, limits, matrix
 from kfgen.spec.tree import Expression
-from kfgen.spec.types import Code, Constant, Fixed, Initialize, Input, Parameter, Spec, Step
+from kfgen.spec.types import Code, Constant, Fixed, History, Initialize, Input, Parameter, Spec, Step
 from kfgen.spec.walk import Walker
 
 
@@ -55,6 +55,7 @@ class Builder:
             filter=self.filters.filter(top.get("filter"), states),
             fixed=self.fixed(),
             code=self.code(),
+            history=self.history(),
             advice=tuple(name for name in top.get("advice", ()) if name is not None),
             place=top.place,
             places=dict(top.places),
@@ -118,6 +119,14 @@ class Builder:
         by_state = dict(entries(scale)) if isinstance(scale, Fields) else None
         at = f.places.get("log", f.place)
         return Fixed(by_state, f.get("rounding", "nearest"), f.get("overflow", "saturate"), f.get("log"), at)
+
+    def history(self) -> History | None:
+        f = self.top.get("history")
+        if not isinstance(f, Fields):
+            return None
+        number = self.values.number
+        steps, per_step, keep = number(f.get("steps")), number(f.get("per_step")), number(f.get("keep"))
+        return History(steps or 1, per_step or 4, keep or 1, f.place, dict(f.places))
 
     def compensated(self, written: object) -> tuple[str, ...]:
         if isinstance(written, bool):
