@@ -31,6 +31,7 @@ from kfgen.interface import Array, Filter
 from kfgen.native.run import Plan, plan
 from kfgen.scalar_names import DOUBLE, FLOAT
 from kfgen.simulate import simulate
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status, describe
 
@@ -174,19 +175,21 @@ def _follow(ref: ReferenceFilter, *others: Filter) -> None:
 
 @dataclass(frozen=True)
 class Call:
-    """An update of a sensor with z [m], or without a sensor a predict; u [nu], dt in s and mask where they are used."""
+    """An update of a sensor with z [m] and its own inputs, or without a sensor a predict; u [nu], dt in s and mask
+    where they are used."""
 
     sensor: str | None = None
     z: Array = field(default_factory=lambda: np.empty(0))
     u: Array | None = None
     dt: float | None = None
     mask: int | None = None
+    inputs: Array | None = None
 
 
 def _made(kf: Filter, call: Call) -> int:
     if call.sensor is None:
         return kf.predict(call.u, call.dt)
-    return kf.update(call.sensor, call.z, call.u, call.mask)
+    return kf.update(call.sensor, call.z, call.u, call.mask, call.inputs)
 
 
 def _calls(spec: Spec, work: Plan, row: int, random: np.random.Generator) -> list[Call]:
@@ -196,14 +199,13 @@ def _calls(spec: Spec, work: Plan, row: int, random: np.random.Generator) -> lis
     calls: list[Call] = []
     if work.step[row]:
         calls.append(Call(u=u, dt=float(work.dt[row]) if run_time else None))
-    first = 0
-    for i, sensor in enumerate(spec.measurements):
-        last = first + len(sensor.components)
+    for i, (sensor, place) in enumerate(readings_of(spec)):
         if work.mask[row, i]:
+            m = len(sensor.components)
             masked = sensor.partial and random.random() < 0.2
-            mask = int(random.integers(0, 1 << (last - first))) if masked else None
-            calls.append(Call(sensor.name, work.z[row, first:last], u, mask=mask))
-        first = last
+            mask = int(random.integers(0, 1 << m)) if masked else None
+            z, own = np.split(work.z[row, place], [m])
+            calls.append(Call(sensor.name, z, u, mask=mask, inputs=own if sensor.inputs else None))
     return calls
 
 

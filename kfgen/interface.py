@@ -41,8 +41,12 @@ class Filter(Protocol):
         """u [nu] and dt in s: only, and always, where the filter takes them."""
         ...
 
-    def update(self, sensor: str, z: Array, u: Array | None = None, mask: int | Sequence[bool] | None = None) -> int:
-        """z [m]; u [nu] where the sensor takes inputs; mask: the components to use, bit i for component i."""
+    def update(
+        self, sensor: str, z: Array, u: Array | None = None, mask: int | Sequence[bool] | None = None,
+        inputs: Array | None = None,
+    ) -> int:  # fmt: skip
+        """z [m]; u [nu] where the sensor takes inputs; mask: the components to use, bit i for component i; inputs:
+        the sensor's own, where it has some."""
         ...
 
     def set_state(self, x: Array) -> int: ...

@@ -1,4 +1,5 @@
-"""Logs: CSV files with the columns `t`, `<input>`, `<sensor>.<component>`; an empty cell: no measurement."""
+"""Logs: CSV files with the columns `t`, `<input>`, `<sensor>.<component>`, `<sensor>.<its own input>`; an empty cell:
+no measurement."""
 
 from __future__ import annotations
 
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kfgen.errors import KfgenError
 from kfgen.files import writing
+from kfgen.spec.sensors import columns_of
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -48,14 +50,14 @@ Source = Log | Mapping[str, ArrayLike] | str | os.PathLike[str]
 
 
 def needed_columns(spec: Spec, known: Collection[str] | None = None) -> list[str]:
-    """The columns a log must have: `t` for a run-time dt, all inputs, all components of all sensors.
+    """The columns a log must have: `t` for a run-time dt, all inputs, all components and own inputs of all sensors.
 
     known: the columns there are, where a sensor of which none is there need not be there at all.
     """
     run_time = spec.dt is not None and spec.dt.run_time
     needed = [*(["t"] if run_time else []), *(each.name for each in spec.inputs)]
     for sensor in spec.measurements:
-        names = [f"{sensor.name}.{each.name}" for each in sensor.components]
+        names = columns_of(sensor)
         if known is None or any(name in known for name in names):
             needed += names
     return needed

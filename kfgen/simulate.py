@@ -5,8 +5,8 @@ noise. The model is evaluated by the reference, never by generated code.
 
 * Noise inputs are drawn with their covariance and go through f (and h). The additive Q, and densities, are
   drawn with their covariance along the track. R likewise. Semidefinite covariances are fine.
-* Inputs are smooth: three sines with periods of 25 to 250 steps, within a quarter of the half-width of the
-  input's range around its middle; without a range around 0 with an amplitude of at most 1.
+* Inputs, those of sensors too, are smooth: three sines with periods of 25 to 250 steps, within a quarter of the
+  half-width of the input's range around its middle; without a range around 0 with an amplitude of at most 1.
 * Fixed dt: row k is the time (k + 1) dt, after that row's predict. Run-time dt: the first row is t = 0,
   without a step; the steps are the nominal one with up to 10 % of jitter, within [min, max].
 * An imm switches modes by its transition matrix, row by row, from a mode drawn with mu0.
@@ -34,8 +34,9 @@ from kfgen.reference.process import Process
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import StepError
 from kfgen.spec.modes import mode_specs
+from kfgen.spec.sensors import columns_of
 from kfgen.spec.tree import Expression, Number
-from kfgen.spec.types import Matrix, Noise, Sensor, Spec
+from kfgen.spec.types import Input, Matrix, Noise, Sensor, Spec
 
 Array = NDArray[np.float64]
 
@@ -89,12 +90,13 @@ def _simulate(spec: Spec, steps: int, random: Draws, every: Mapping[str, int], g
     worlds = [_World(each) for each in mode_specs(spec)]
     model = worlds[0].model
     t, dt = _times(spec, model, steps, random)
-    u = _inputs(spec, model, steps, random)
+    u = _inputs(spec.inputs, model, steps, random)
     modes = _mode_track(spec, model, dt, random)
     x = worlds[modes[0]].initial(random)
     run_time = spec.dt is not None and spec.dt.run_time
     truth = np.empty((steps, model.n))
-    readings = {sensor.name: np.full((steps, len(sensor.components)), np.nan) for sensor in spec.measurements}
+    given = {sensor.name: _inputs(sensor.inputs, model, steps, random) for sensor in spec.measurements}
+    readings = {sensor.name: np.full((steps, len(sensor.fields)), np.nan) for sensor in spec.measurements}
     now = 0.0
     for k in range(steps):
         world = worlds[modes[k]]
@@ -102,16 +104,15 @@ def _simulate(spec: Spec, steps: int, random: Draws, every: Mapping[str, int], g
             x = world.step(x, Context(model.values, u[k], now, float(dt[k])), random)
             now = float(t[k])
         truth[k] = x
-        context = Context(model.values, u[k], now, 0.0)
         for name, column in readings.items():
+            context = Context(model.values, u[k], now, 0.0, given[name][k])
             z = world.measure(name, x, context, random)
             lost = gaps > 0 and random.random() < gaps
             if k % every.get(name, 1) == 0 and not lost:
-                column[k] = z
+                column[k] = np.concatenate([z, given[name][k]])
     columns = {"t": t, **{each.name: u[:, i] for i, each in enumerate(spec.inputs)}}
     for sensor in spec.measurements:
-        for i, component in enumerate(sensor.components):
-            columns[f"{sensor.name}.{component.name}"] = readings[sensor.name][:, i]
+        columns |= dict(zip(columns_of(sensor), readings[sensor.name].T, strict=True))
     columns |= {f"true.{name}": truth[:, i] for i, name in enumerate(model.states)}
     return Log(columns, steps, "<simulated>")
 
@@ -164,7 +165,7 @@ class _World:
         meter = self._meters[name]
         used = tuple(range(meter.model.m))
         noise = self.model.noise_covariance(meter.spec.noise, meter.spec.noise_covariance)
-        e = _draw(noise(self.model.environment(context, x)), random)
+        e = _draw(noise(self.model.environment(context, x, own=meter.model.own)), random)
         z = np.array([value_of(h) for h in meter.model.predict(list(x), list(e), context, used)])
         R = meter.additive.linearise(x, Reading(meter.additive, z, used, context)).R
         z = z + _draw(R, random)
@@ -225,11 +226,11 @@ def _times(spec: Spec, model: Model, steps: int, random: Draws) -> tuple[Array, 
     return t, np.diff(t, prepend=0.0)
 
 
-def _inputs(spec: Spec, model: Model, steps: int, random: Draws) -> Array:
+def _inputs(inputs: tuple[Input, ...], model: Model, steps: int, random: Draws) -> Array:
     """Smooth inputs [steps, inputs]."""
-    u = np.empty((steps, len(spec.inputs)))
+    u = np.empty((steps, len(inputs)))
     k = np.arange(steps)
-    for i, each in enumerate(spec.inputs):
+    for i, each in enumerate(inputs):
         middle, amplitude = 0.0, 1.0
         if each.range is not None:
             low, high = (model.number(limit) for limit in each.range)

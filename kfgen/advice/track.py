@@ -53,9 +53,10 @@ def follow(spec: Spec) -> list[Track]:
     x = np.column_stack([log.columns[f"true.{state.name}"] for state in spec.states])
     u = np.column_stack([log.columns[each.name] for each in spec.inputs] or [np.zeros((rows, 0))])
     t = log.columns["t"]
+    given = {s.name: np.array([log.columns[f"{s.name}.{i.name}"] for i in s.inputs]).T for s in spec.measurements}
     try:
         with np.errstate(all="ignore"):
-            return [_along(mode, x, u, t) for mode in mode_specs(spec)]
+            return [_along(mode, x, u, t, given) for mode in mode_specs(spec)]
     except StepError:
         raise KfgenError(f"{spec.name}: the model cannot be linearised along a track of its own") from None
 
@@ -88,7 +89,8 @@ def _size(spec: Spec) -> int:
     return nodes((dynamics, spec.let)) * (stages if dynamics.form == "continuous" else 1) + nodes(spec.measurements)
 
 
-def _along(spec: Spec, x: Array, u: Array, t: Array) -> Track:
+def _along(spec: Spec, x: Array, u: Array, t: Array, given: dict[str, Array]) -> Track:
+    """given: the own inputs of each sensor that has some (k, inputs)."""
     model = Model(spec)
     process = Process(model)
     dt = 1.0 if spec.dt is None else model.number(spec.dt.nominal)
@@ -104,7 +106,8 @@ def _along(spec: Spec, x: Array, u: Array, t: Array) -> Track:
         F[k], step[k] = after.F, after.x - x[k]
         for name, sensor in sensors.items():
             used = tuple(range(sensor.m))
-            found = sensor.linearise(x[k], Reading(sensor, np.zeros(sensor.m), used, context))
+            own = replace(context, own=given[name][k]) if sensor.own else context
+            found = sensor.linearise(x[k], Reading(sensor, np.zeros(sensor.m), used, own))
             H[name][k] = found.H
             R.setdefault(name, found.R)
         if k == 0:

@@ -54,7 +54,7 @@ def run(
     scalar: str | None,
     ranges: Path | None,
 ) -> None:
-    """Run the compiled filter over a log with the columns t, <input>, <sensor>.<component>.
+    """Run the compiled filter over a log with the columns t, <input>, <sensor>.<component>, <sensor>.<its input>.
 
     An empty cell is no measurement; a sensor with only some of its components is not updated, unless it is
     `partial: true`. An empty input keeps its last value. Per row: predict, then the updates in the spec's
@@ -63,8 +63,8 @@ def run(
     dt: exit status 2 where it falls, its usual step is not dt (5 %), or over 1 % of
     its steps exceed 1.5 dt. Exit status 1 where each update failed.
 
-    The result has the columns t, x.<state>, var.<state>, nis.<sensor>, status, mu.<mode>. It goes to OUT.csv,
-    or to stdout if neither -o nor --plot is given.
+    The result has the columns t, x.<state>, var.<state>, nis.<sensor>, status, mu.<mode>, out.<output>,
+    out_std.<output>. It goes to OUT.csv, or to stdout if neither -o nor --plot is given.
     """
     from kfgen import logs, native
     from kfgen.native.run import fixed_step
@@ -109,6 +109,8 @@ def columns(spec: Spec, result: RunResult) -> dict[str, NDArray[np.generic]]:
     out["status"] = result.status
     if result.mu is not None and spec.imm is not None:
         out |= {f"mu.{mode.name}": result.mu[:, i].astype(own) for i, mode in enumerate(spec.imm.modes)}
+    out |= {f"out.{name}": value.astype(own) for name, value in result.outputs.items()}
+    out |= {f"out_std.{name}": deviation.astype(own) for name, deviation in result.output_std.items()}
     return out
 
 

@@ -15,10 +15,13 @@ from kfgen.logs import Log, as_log
 from kfgen.native.emitted import Emitted
 from kfgen.native.run import plan
 from kfgen.native.values import Units, value_of
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 
 ROWS = 60
 """Rows of a log that are run if not said otherwise."""
+OUTPUTS, TOLD = "get_outputs", ("value", "std")
+"""The function that tells the outputs, where there are some, and its arguments."""
 BEFORE = 0.01
 """The step in s before a log's first row, which none is known of: so that every row is predicted and updated."""
 
@@ -75,6 +78,8 @@ def make_job(emitted: Emitted, log: Log, rows: int = ROWS) -> Job:
         for function, counts in ((f"update_{sensor.name}", True), (f"update_{sensor.name}_masked", False)):
             if declared.has(function):
                 functions[function], sensors[function] = counts, sensor.name
+    if declared.has(OUTPUTS):
+        functions[OUTPUTS] = False
     sources = {f"{spec.name}.{ending}": emitted.files[f"{spec.name}.{ending}"] for ending in ("h", "c")}
     calls = {function: _call(declared, function, sensors.get(function, "")) for function in ("init", *functions)}
     return Job(
@@ -87,6 +92,7 @@ def _variables(spec: Spec, declared: Declarations, functions: Mapping[str, bool]
     taken = {argument for function in functions for argument in declared.functions[function]}
     kinds = {"u": f"{spec.name}_inputs_t", "dt": f"{spec.name}_real_t", "mask": "uint32_t"}
     variables = {name: kind for name, kind in kinds.items() if name in taken}
+    variables |= {name: f"{spec.name}_outputs_t" for name in TOLD if OUTPUTS in functions}
     return variables | {f"z_{sensor.name}": f"{spec.name}_{sensor.name}_t" for sensor in spec.measurements}
 
 
@@ -95,6 +101,7 @@ def _call(declared: Declarations, function: str, sensor: str) -> str:
     name, arguments = declared.prefix, declared.functions[function]
     p = f"{name}_kfgen_"
     spelled = {"kf": f"&{p}kf", "u": f"&{p}u", "dt": f"{p}dt", "mask": f"{p}mask", "z": f"&{p}z_{sensor}"}
+    spelled |= {name: f"&{p}{name}" for name in TOLD}
     if any(argument not in spelled for argument in arguments):
         raise KfgenError(f"{name}_{function} has an argument that is not understood: {', '.join(arguments)}")
     return f"{name}_{function}({', '.join(spelled[a] for a in arguments)})"
@@ -111,17 +118,16 @@ def _steps(spec: Spec, declared: Declarations, log: Log) -> list[Step]:
         u = {"u": scalar.to_raw(work.u[row], units.u)} if spec.inputs else {}
         if work.step[row]:
             steps.append(Step("predict", {**u, "dt": scalar.to_raw(work.dt[row : row + 1], units.dt)}))
-        first = 0
-        for i, sensor in enumerate(spec.measurements):
-            last = first + len(sensor.components)
-            bits, full = int(work.mask[row, i]), (1 << (last - first)) - 1
+        for i, (sensor, place) in enumerate(readings_of(spec)):
+            bits, full = int(work.mask[row, i]), (1 << len(sensor.components)) - 1
             if bits:
-                given = scalar.near(work.z[row, first:last], units.z_periods[sensor.name])
+                given = scalar.near(work.z[row, place], units.z_periods[sensor.name])
                 z = {f"z_{sensor.name}": scalar.to_raw(given, units.z[sensor.name])}
                 if bits == full:
                     steps.append(Step(f"update_{sensor.name}", {**u, **z}))
                 else:
                     mask = {"mask": np.array([bits], dtype=np.uint32)}
                     steps.append(Step(f"update_{sensor.name}_masked", {**u, **z, **mask}))
-            first = last
+        if declared.has(OUTPUTS):
+            steps.append(Step(OUTPUTS, {}))
     return steps

@@ -22,7 +22,8 @@ class Named:
 class SensorView:
     name: str
     NAME: str
-    components: tuple[Named, ...]
+    components: int
+    fields: tuple[Named, ...]  # the components, and what else comes with a measurement
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,7 @@ class View:
     inputs: tuple[Named, ...]
     sensors: tuple[SensorView, ...]
     parameters: tuple[Named, ...]
+    outputs: tuple[Named, ...]
     modes: tuple[Struct, ...]
     fields: tuple[Field, ...]
     statuses: tuple[Named, ...]

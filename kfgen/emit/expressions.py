@@ -57,6 +57,8 @@ class Expressions:
             case "bit":
                 path, place = node.data
                 return f"({self.path(path)} & 0x{1 << place:x}u) != 0u", _RELATION
+            case "present":
+                return f"{node.data} != NULL", _RELATION
             case "half":
                 return f"{e(node.args[0], _PRODUCT)} / 2", _PRODUCT
             case "slope":

@@ -11,6 +11,7 @@ from kfgen.emit.fixed_point import may_saturate
 from kfgen.emit.printer import Printer
 from kfgen.emit.text import WIDTH, comment, fill, with_unit
 from kfgen.filters.base import FilterCode
+from kfgen.filters.steps.outputs import FUNCTION as OUTPUTS
 from kfgen.ir.count import operations
 from kfgen.ir.nodes import Constants, Table
 from kfgen.ir.program import Argument, Flag, Function, Guard, walk
@@ -91,7 +92,7 @@ class FunctionMaker:
 
     def _opening(self, f: Function, has_flags: bool, body: list[str]) -> tuple[str, ...]:
         """The lines before the body: null pointers refused, the status declared."""
-        test = " || ".join(f"{a.name} == NULL" for a in f.arguments if a.pointer)
+        test = " || ".join(f"{a.name} == NULL" for a in f.arguments if a.pointer and not a.optional)
         leave = "return;" if f.returns == "void" else f"return {self.NAME}_NULL_ARGUMENT;"
         opening = [] if f.private else [f"if ({test}) {{ {leave} }}"]
         if has_flags and not f.private:
@@ -104,10 +105,12 @@ class FunctionMaker:
 
     def _parameters(self, f: Function) -> tuple[str, ...]:
         docs = {"u": ", ".join(with_unit(i.name, i.unit) for i in self.spec.inputs)}
+        if f.name == OUTPUTS:
+            docs["value"] = ", ".join(with_unit(o.name, o.unit) for o in self.spec.outputs)
         sensor = f.name.removeprefix("update_")
         for s in self.spec.measurements:
             if s.name == sensor:
-                docs["z"] = ", ".join(with_unit(c.name, c.unit) for c in s.components)
+                docs["z"] = ", ".join(with_unit(c.name, c.unit) for c in s.fields)
         out = []
         width = max(len(a.name) for a in f.arguments)
         for a in f.arguments:

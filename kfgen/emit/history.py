@@ -60,7 +60,7 @@ def history_view(code: FilterCode, view: View, scalar: Scalar) -> HistoryView | 
         return None
     public = {f.name: f for f in view.functions if not f.private}
     updates = [
-        _update(function, sensor.name, ", ".join(with_unit(c.name, c.unit) for c in sensor.components))
+        _update(function, sensor.name, ", ".join(with_unit(c.name, c.unit) for c in sensor.fields))
         for sensor in spec.measurements
         for function in (public.get(f"update_{sensor.name}"), public.get(f"update_{sensor.name}_masked"))
         if function is not None
@@ -90,7 +90,7 @@ def _ram(h: HistoryView, view: View, scalar: Scalar) -> int:
     """The size of the struct: natural alignment, as `struct.ram` reckons."""
     real = scalar.size
     inputs = (real * len(view.inputs), real)
-    sizes = {sensor.name: (real * len(sensor.components), real) for sensor in view.sensors}
+    sizes = {sensor.name: (real * len(sensor.fields), real) for sensor in view.sensors}
     given = [
         _struct([sizes[u.sensor], *([inputs] if u.takes_u else []), *([(4, 4)] if u.takes_mask else [])])
         for u in h.updates

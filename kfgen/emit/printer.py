@@ -60,6 +60,9 @@ class Printer(Expressions):
             case Guard(condition=condition, status=status, before=before, why=why):
                 returned = f"{self.prefix.upper()}_{status}"
                 body = [line for store in before for line in self._statement(store, depth + 1)]
+                if condition.constant:  # the end of a branch
+                    stores = [line for store in before for line in self._statement(store, depth)]
+                    return [*stores, "    " * depth + f"return {returned};"]
                 body += ["    " * (depth + 1) + f"return {returned};"]
                 head = wrapped(f"if ({e(condition)}) {{" + (f" /* {why} */" if why else ""), depth)
                 one_line = f"{head[0]} {body[0].strip()} }}"

@@ -63,8 +63,11 @@ def make_view(code: FilterCode, scalar: Scalar, overridden: bool, fixed: FixedPo
         cost_table=tuple(header.cost_table(maker.costs)),
         advice=code.notes,
         inputs=header.members(spec.inputs),
-        sensors=tuple(SensorView(s.name, s.name.upper(), header.members(s.components)) for s in spec.measurements),
+        sensors=tuple(
+            SensorView(s.name, s.name.upper(), len(s.components), header.members(s.fields)) for s in spec.measurements
+        ),
         parameters=header.members(spec.parameters),
+        outputs=header.members(spec.outputs),
         modes=struct.modes(name, code.blocks),
         fields=struct.fields(name, code.blocks, bool(spec.parameters)),
         statuses=tuple(header.statuses()),

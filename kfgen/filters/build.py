@@ -228,7 +228,7 @@ def _order(models: tuple[Model, ...]) -> list[int]:
 
 def _private_words(spec: Spec, scalar: Scalar) -> set[str]:
     """What follows the filter's name in the names of its helpers, private functions and tables."""
-    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach", "draws"}
+    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach", "draws", "isolate", "isolate_root"}
     words |= {f"{kind}_{sensor.name}" for kind in ("h", "see", "recall") for sensor in spec.measurements}
     modes = spec.imm.modes if spec.imm else ()
     return words | {f"{word}_{mode.name}" for word in words for mode in modes}

@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Call, Statement, roots, walk
 
-GIVEN = ("u.", "kf.parameters.")
-"""Paths of inputs and parameters."""
+GIVEN = ("u.", "z.", "kf.parameters.")
+"""Paths of inputs, of what comes with a measurement, and of parameters."""
 
 
 def given(statements: Iterable[Statement]) -> set[str]:
-    """Paths of the inputs and parameters that statements use, in private functions too."""
+    """Paths of what a caller sets that statements use, in private functions too."""
     found: set[str] = set()
     seen: set[int] = set()
     for statement in statements:

@@ -146,6 +146,8 @@ class _Machine:
             case "bit":
                 path, place = node.data
                 return bool(self.memory.numbers[path] >> place & 1)
+            case "present":  # all arguments are at hand
+                return True
             case "half":
                 return self.value(node.args[0]) // 2
             case "select":  # as C's ?: only the chosen branch is evaluated

@@ -122,6 +122,7 @@ class Argument:
     constant: bool = True
     doc: str = ""
     size: int | None = None  # arrays: type name[size]
+    optional: bool = False  # may be NULL
 
 
 @dataclass(slots=True)

@@ -175,6 +175,10 @@ class Trace:
         """Whether a bit of an integer argument is set."""
         return self.wrapped(self.pool.make("bit", (), (path, place), BOOL))
 
+    def present(self, argument: str) -> Value:
+        """Whether an optional argument is given."""
+        return self.wrapped(self.pool.make("present", (), argument, BOOL))
+
     def name(self, value: Value, name: str) -> Value:
         """Keep a value under a name of the model; constants and what has a name keep theirs."""
         if value.node.op not in ("const", "field") and value.node not in self.names:

@@ -10,6 +10,7 @@ import sympy
 
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
+from kfgen.model.first import build_firsts
 from kfgen.model.model import Model, SensorModel, build_model
 from kfgen.model.symbolic import to_sympy
 from kfgen.spec.modes import mode_specs
@@ -70,7 +71,9 @@ def build_bank(spec: Spec) -> BankModel:
     mu0 = [number(e.tree) for e in imm.mu0]
     mu = tuple(m / sum(mu0) for m in mu0)
     time = any(model.uses_time() for model in models)
-    head = replace(first, spec=spec, x0=_combined(models, mu), keeps_time=time)
+    head = replace(
+        first, spec=spec, x0=_combined(models, mu), keeps_time=time, firsts=build_firsts(spec, names),
+    )  # fmt: skip
     return BankModel(
         head=head,
         modes=models,

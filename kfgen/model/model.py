@@ -14,6 +14,7 @@ from kfgen.errors import Mistake, Place, SpecError
 from kfgen.geometry import Part, part_of
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace
+from kfgen.model.first import FirstModel, build_firsts
 from kfgen.model.options import INNOVATION, GateModel, Options, build_gate, build_options
 from kfgen.model.start import initial_covariance
 from kfgen.model.symbolic import constants, partials, to_sympy
@@ -57,9 +58,22 @@ class SensorModel:
         return tuple(part_of(period) for period in self.periods)
 
     @property
+    def inputs(self) -> tuple[str, ...]:
+        """Known values that come with a measurement; their fields stand behind the components'."""
+        return tuple(i.name for i in self.spec.inputs)
+
+    @property
     def dimension(self) -> int:
         """Degrees of freedom of an innovation."""
         return sum(part.dimension for part in self.parts)
+
+
+@dataclass(frozen=True)
+class OutputModel:
+    """What firmware reads: a function of the state, parameters and t."""
+
+    name: str
+    value: Symbolic
 
 
 @dataclass(frozen=True)
@@ -85,6 +99,8 @@ class Model:
     dt: Fraction | None  # None: given at run time
     dt_limits: tuple[Fraction | None, Fraction | None] = (None, None)
     options: Options = field(default_factory=Options)
+    outputs: tuple[OutputModel, ...] = ()
+    firsts: tuple[FirstModel, ...] = ()  # of a bank: its head's
     keeps_time: bool = False  # whether something outside of the model depends on t
     _partials: dict[Symbolic, tuple[tuple[Symbolic, Symbolic], ...]] = field(default_factory=dict, repr=False)
 
@@ -144,9 +160,18 @@ class Model:
         spec = replace(self.spec, filter=filter_of(self.spec.filter, sensor.spec))
         return replace(self, spec=spec, options=sensor.options)
 
+    def first(self, sensor: SensorModel) -> FirstModel | None:
+        """What the first measurement of a sensor sets."""
+        return next((rule for rule in self.firsts if rule.sensor == sensor.name), None)
+
+    @property
+    def waits(self) -> bool:
+        """Whether nothing is done until certain sensors have come."""
+        return any(rule.waits for rule in self.firsts)
+
     def uses_time(self) -> bool:
         """Whether anything depends on t, so that the filter has to keep it."""
-        all_expressions = self.dynamics_expressions()
+        all_expressions = [*self.dynamics_expressions(), *(output.value for output in self.outputs)]
         for sensor in self.sensors:
             all_expressions += self.sensor_expressions(sensor)
         return self.keeps_time or "t" in self.uses(*all_expressions)
@@ -206,6 +231,7 @@ class _Builder:
                 None if step.minimum is None else self.number(step.minimum),
                 None if step.maximum is None else self.number(step.maximum),
             )
+        sensors = tuple(self.sensor(s) for s in spec.measurements)
         return Model(
             spec=spec,
             symbols=self.symbols,
@@ -215,7 +241,7 @@ class _Builder:
             noises=self.noises(spec.noise),
             noise_covariance=self.covariance(spec.noise, spec.noise_covariance),
             Q=Q,
-            sensors=tuple(self.sensor(s) for s in spec.measurements),
+            sensors=sensors,
             x0=tuple(self.number(s.init, folded) for s in spec.states),
             P0=initial_covariance(spec, lambda e: self.number(e, folded)),
             periods=tuple(None if s.period is None else self.number(s.period) for s in spec.states),
@@ -228,6 +254,8 @@ class _Builder:
             dt=fixed,
             dt_limits=limits,
             options=self.options(spec.filter),
+            firsts=build_firsts(spec, self.names),
+            outputs=tuple(OutputModel(o.name, self.tree(o.value)) for o in spec.outputs),
         )
 
     def options(self, chosen: Filter) -> Options:
@@ -270,8 +298,8 @@ class _Builder:
         return tuple(tuple(variances[i] if i == j else sympy.S.Zero for j in range(q)) for i in range(q))
 
     def sensor(self, sensor: Sensor) -> SensorModel:
-        for noise in sensor.noise:
-            self.declare(noise.name)
+        for name in (*(w.name for w in sensor.noise), *(i.name for i in sensor.inputs)):
+            self.declare(name)
         m = len(sensor.components)
         if sensor.R is not None:
             R = self.matrix(sensor.R)

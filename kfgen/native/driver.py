@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib.resources import files
+from typing import Any
 
 import jinja2
 
 from kfgen.emit.declarations import Declarations
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 
 
@@ -19,27 +21,24 @@ def declarations(name: str) -> str:
 def source(spec: Spec, declared: Declarations, history: bool = False) -> str:
     """The driver's C text for a filter, with its past or without; its functions are called with what they take."""
     name = spec.name
-    sensors, first = [], 0
-    for sensor in spec.measurements:
-        m = len(sensor.components)
+    sensors: list[dict[str, Any]] = []
+    for sensor, place in readings_of(spec):
         sensors.append(
             {
                 "name": sensor.name,
-                "m": m,
-                "first": first,
-                "full": (1 << m) - 1,
+                "fields": range(place.start, place.stop),
+                "full": (1 << len(sensor.components)) - 1,
                 "u": declared.takes(f"update_{sensor.name}", "u"),
                 "masked": declared.has(f"update_{sensor.name}_masked"),
                 "masked_u": declared.takes(f"update_{sensor.name}_masked", "u"),
             }
         )
-        first += m
     return _template().render(
         name=name,
         signature=_signature(name),
         nx=len(spec.states),
         nu=len(spec.inputs),
-        nz=first,
+        nz=sum(len(each["fields"]) for each in sensors),
         sensors=sensors,
         has_u=bool(spec.inputs)
         and (declared.takes("predict", "u") or any(each["u"] or each["masked_u"] for each in sensors)),
@@ -47,6 +46,7 @@ def source(spec: Spec, declared: Declarations, history: bool = False) -> str:
         predict_dt=declared.takes("predict", "dt"),
         covariance=declared.has("get_covariance"),
         modes=len(spec.imm.modes) if spec.imm else 0,
+        outputs=[each.name for each in spec.outputs],
         compensated=spec.code.compensated,
         history=history,
     )
@@ -57,7 +57,7 @@ def _signature(name: str) -> str:
     return (
         f"void {name}_kfgen_run({name}_t *kf, size_t rows, const uint8_t *step, const {real} *dt, "
         f"const {real} *u, const uint32_t *mask, const {real} *z, {real} *x, {real} *rest, {real} *var, {real} *nis, "
-        f"{real} *mu, uint32_t *status)"
+        f"{real} *mu, {real} *out, {real} *deviation, uint8_t *told, uint32_t *status)"
     )
 
 

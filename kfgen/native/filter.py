@@ -32,6 +32,7 @@ class NativeFilter:
         self.states = tuple(state.name for state in spec.states)
         self.inputs = tuple(each.name for each in spec.inputs)
         self.sensors = {each.name: tuple(c.name for c in each.components) for each in spec.measurements}
+        self.own_inputs = {each.name: tuple(i.name for i in each.inputs) for each in spec.measurements}
         self.init()
 
     # the filter's functions
@@ -55,12 +56,16 @@ class NativeFilter:
             arguments.append(None if raw is None else raw.item())
         return self.struct.call("predict", *arguments)
 
-    def update(self, sensor: str, z: Row, u: Row | None = None, mask: int | Sequence[bool] | None = None) -> int:
+    def update(
+        self, sensor: str, z: Row, u: Row | None = None, mask: int | Sequence[bool] | None = None,
+        inputs: Row | None = None,
+    ) -> int:  # fmt: skip
         """Take a measurement in.
 
         z: the components in the spec's order, or a mapping by name. u: where h, R or the sensor's noise use
         inputs. mask: for a sensor with `partial: true`, the components to use: a bit mask (bit i is component
-        i) or one truth value per component; what z holds elsewhere does not matter.
+        i) or one truth value per component; what z holds elsewhere does not matter. inputs: of a sensor that has
+        some of its own, and then always: in the spec's order, or a mapping by name.
         """
         components = self.components(sensor)
         function = f"update_{sensor}"
@@ -73,6 +78,7 @@ class NativeFilter:
         if bits is not None:
             values = np.where([bits >> i & 1 for i in range(len(components))], values, 0.0)
         units = self.struct.units
+        values = np.concatenate([values, self._own(sensor, inputs)])
         values = self.struct.value.near(values, units.z_periods[sensor])
         arguments = [self.struct.record(sensor, values, units.z[sensor])]
         if self._takes(function, "u", u, "inputs", bool(self.inputs)):
@@ -121,6 +127,22 @@ class NativeFilter:
         """The lower Cholesky factor of the covariance [n, n] (`covariance: sqrt` only)."""
         n = len(self.states)
         return self.struct.get("get_sqrt_covariance", np.broadcast_to(self.struct.units.x[:, None], (n, n)))
+
+    @property
+    def outputs(self) -> dict[str, float]:
+        """What the spec's `outputs` are at the present estimate; NaN where one is not finite."""
+        return self._told(0)
+
+    @property
+    def output_std(self) -> dict[str, float]:
+        """Their standard deviations, through the Jacobian."""
+        return self._told(1)
+
+    def _told(self, which: int) -> dict[str, float]:
+        names = [each.name for each in self.spec.outputs]
+        if not names:
+            raise AttributeError(f"filter {self.name} has no outputs; its spec has none")
+        return dict(zip(names, self.struct.outputs(names)[which].tolist(), strict=True))
 
     @property
     def nis(self) -> float:
@@ -227,6 +249,17 @@ class NativeFilter:
         if not takes and given is not None and not surplus:
             raise TypeError(f"{self.name}: {argument}= was given, but {function} takes no {what}")
         return takes
+
+    def _own(self, sensor: str, inputs: Row | None) -> Array:
+        """A sensor's own inputs; TypeError where they are missing, or given to no purpose."""
+        names = self.own_inputs[sensor]
+        if inputs is None:
+            if names:
+                raise TypeError(f"{self.name}: inputs= is missing; sensor {sensor!r} has {', '.join(names)}")
+            return np.empty(0)
+        if not names:
+            raise TypeError(f"{self.name}: inputs= was given, but sensor {sensor!r} has none of its own")
+        return row(inputs, names, f"inputs of {sensor!r}")
 
     def _inputs(self, u: Row | None) -> Any:
         assert u is not None

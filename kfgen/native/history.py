@@ -60,6 +60,7 @@ class NativeHistory(NativeFilter):
         z: Row,
         u: Row | None = None,
         mask: int | Sequence[bool] | None = None,
+        inputs: Row | None = None,
         age: int = 0,
     ) -> int:
         """Take a measurement in at its time, `age` successful predictions ago.
@@ -69,7 +70,7 @@ class NativeHistory(NativeFilter):
         if not 0 <= age < 1 << 32 or age != int(age):
             raise ValueError(f"age counts predictions, 0 for the last one: not {age}")
         self.struct.age = int(age)
-        return super().update(sensor, z, u, mask)
+        return super().update(sensor, z, u, mask, inputs)
 
     def redraw(self) -> int:
         raise AttributeError(f"filter {self.name} with a history is changed by its own functions alone")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from kfgen.logs import Log, Source, as_log
 from kfgen.native.struct import Struct
 from kfgen.native.values import Array
 from kfgen.spec.constants import value
+from kfgen.spec.sensors import columns_of, readings_of
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status
 
@@ -28,7 +29,8 @@ class RunResult:
     t: [N] s, of the log, or step * dt. x: [N, n]. var: [N, n], the covariance's diagonal. nis: sensor -> [N],
     NaN where that sensor was not updated or its update failed. status: [N] uint32, the bits of all calls of
     the row. calls: function -> [N] uint32, its own status (0 where it was not called). mu: [N, modes] for an
-    imm, else None.
+    imm, else None. outputs, output_std: name -> [N], what the spec's `outputs` are after the row, and their standard
+    deviations; NaN where the filter refuses to tell them.
     """
 
     t: Array
@@ -38,6 +40,8 @@ class RunResult:
     status: NDArray[np.uint32]
     calls: Mapping[str, NDArray[np.uint32]]
     mu: Array | None = None
+    outputs: Mapping[str, Array] = field(default_factory=dict)
+    output_std: Mapping[str, Array] = field(default_factory=dict)
 
     def counts(self, errors: bool = True) -> dict[str, dict[Status, int]]:
         """How often each function returned each error (or warning) bit; functions without are left out."""
@@ -64,7 +68,7 @@ class Plan:
     """What is to be done in each row; float64, physical.
 
     step: [N] whether to predict. dt: [N] s. u: [N, nu]. mask: [N, sensors] bits of the components to use, 0
-    for no update. z: [N, components of all sensors], 0 where there is none. t: [N] s.
+    for no update. z: [N, components and own inputs of all sensors], 0 where there is none. t: [N] s.
     """
 
     t: Array
@@ -81,9 +85,9 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
     Per row: predict, then the updates in the spec's order. Run-time dt: t minus the t of the row before; no
     predict in the first row and where t is equal. Fixed dt (`dt` gives it in s for `t`): one predict per row, none
     where there is a t and it is that of the row before.
-    A sensor is updated where all its components are there; with `partial: true` the components that are there
-    are used, otherwise a half-filled row of a sensor is no measurement. An empty input keeps the value of the
-    row before; an input that is empty in the first row is a KfgenError.
+    A sensor is updated where all its components are there, and its own inputs with them; with `partial: true` the
+    components that are there are used, otherwise a half-filled row of a sensor is no measurement. An empty input
+    keeps the value of the row before; an input that is empty in the first row is a KfgenError.
     """
     rows, columns = log.rows, log.columns
     run_time = spec.dt is not None and spec.dt.run_time
@@ -103,11 +107,12 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
     values: list[Array] = []
     absent = np.full(rows, np.nan)
     for i, sensor in enumerate(spec.measurements):
-        names = [f"{sensor.name}.{each.name}" for each in sensor.components]
-        z = np.column_stack([columns.get(name, absent) for name in names])
-        bits = (~np.isnan(z)) @ (1 << np.arange(z.shape[1]))
-        full = (1 << z.shape[1]) - 1
+        z = np.column_stack([columns.get(name, absent) for name in columns_of(sensor)])
+        m = len(sensor.components)
+        bits = (~np.isnan(z[:, :m])) @ (1 << np.arange(m))
+        full = (1 << m) - 1
         mask[:, i] = bits if sensor.partial else np.where(bits == full, full, 0)
+        mask[np.isnan(z[:, m:]).any(axis=1), i] = 0
         values.append(np.where(np.isnan(z), 0.0, z))
     return Plan(t, step.astype(np.uint8), difference, u, mask, np.hstack(values) if values else np.empty((rows, 0)))
 
@@ -144,6 +149,9 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         "var": np.zeros((rows, n), scalar.dtype),
         "nis": np.zeros((rows, sensors), scalar.dtype),
         "mu": np.zeros((rows, modes), scalar.dtype),
+        "out": np.zeros((rows, len(spec.outputs)), scalar.dtype),
+        "deviation": np.zeros((rows, len(spec.outputs)), scalar.dtype),
+        "told": np.zeros(rows, np.uint8),
         "status": np.zeros((rows, sensors + 1), np.uint32),
     }
     if not scalar.representable(np.concatenate([work.u.ravel(), work.z.ravel(), work.dt])):
@@ -156,6 +164,10 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
     functions = ["predict", *(f"update_{name}" for name in units.z)]
     x = scalar.to_physical(arrays["x"], units.x)
     x[:, list(struct.compensated)] += arrays["rest"].astype(np.float64)
+    told: dict[str, dict[str, Array]] = {}
+    for kind in ("out", "deviation"):
+        numbers = np.where(arrays["told"][:, None] != 0, scalar.to_physical(arrays[kind], units.outputs), np.nan)
+        told[kind] = dict(zip((each.name for each in spec.outputs), numbers.T, strict=True))
     return RunResult(
         t=work.t,
         x=x,
@@ -166,6 +178,8 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         status=np.bitwise_or.reduce(status, axis=1),
         calls={function: status[:, i] for i, function in enumerate(functions)},
         mu=scalar.to_physical(arrays["mu"], units.one) if modes else None,
+        outputs=told["out"],
+        output_std=told["deviation"],
     )
 
 
@@ -176,7 +190,7 @@ def _call(
     progress: Callable[[int, int], None] | None,
 ) -> None:
     ffi, function = struct.ffi, getattr(struct.lib, f"{struct.name}_kfgen_run")
-    types = {"step": "uint8_t *", "mask": "uint32_t *", "status": "uint32_t *"}
+    types = {"step": "uint8_t *", "told": "uint8_t *", "mask": "uint32_t *", "status": "uint32_t *"}
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     for first in range(0, rows, CHUNK):
         count = min(CHUNK, rows - first)
@@ -197,13 +211,10 @@ def _refuse(work: Plan, arrays: Mapping[str, NDArray[Any]], spec: Spec) -> None:
     wrong = ~np.isfinite(np.column_stack([work.u, work.dt])).all(axis=1) & (work.step != 0)
     status[wrong, 0] = Status.NOT_FINITE
     arrays["step"][wrong] = 0
-    first = 0
-    for i, sensor in enumerate(spec.measurements):
-        last = first + len(sensor.components)
-        wrong = ~np.isfinite(work.z[:, first:last]).all(axis=1)
+    for i, (_, place) in enumerate(readings_of(spec)):
+        wrong = ~np.isfinite(work.z[:, place]).all(axis=1)
         status[wrong, i + 1] = Status.NOT_FINITE
         arrays["mask"][wrong, i] = 0
-        first = last
 
 
 def fixed_step(spec: Spec) -> float:

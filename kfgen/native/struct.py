@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from kfgen.emit.declarations import Declarations
 from kfgen.native.arguments import numpy_type
 from kfgen.native.values import Array, Units, Value, value_of
 from kfgen.spec.types import Spec
-from kfgen.status import Status
+from kfgen.status import ERROR, Status
 
 
 class Struct:
@@ -71,6 +72,15 @@ class Struct:
         self.function(function)(self.data, out)
         raw = np.frombuffer(self.ffi.buffer(out), dtype=self.value.dtype).reshape(unit.shape)
         return self.value.to_physical(raw, unit)
+
+    def outputs(self, names: Sequence[str]) -> tuple[Array, Array]:
+        """The outputs and their standard deviations; NaN where the filter refuses to tell them."""
+        told = [self.ffi.new(f"{self.name}_outputs_t *") for _ in range(2)]
+        if self.call("get_outputs", *told) >= ERROR:
+            return np.full(len(names), np.nan), np.full(len(names), np.nan)
+        raw = [np.array([getattr(each, name) for name in names], self.value.dtype) for each in told]
+        value, deviation = (self.value.to_physical(each, self.units.outputs) for each in raw)
+        return value, deviation
 
     # arguments; None where the scalar type cannot carry the numbers
 

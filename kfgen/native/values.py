@@ -125,17 +125,19 @@ class Units:
         self.P: Array = np.outer(self.x, self.x) / value.one  # its LSB is LSB_i LSB_j 2^n
         self.u: Array = np.array([value.unit(each.name) for each in spec.inputs])
         self.z: dict[str, Array] = {
-            sensor.name: np.array([value.unit(f"{sensor.name}_{each.name}") for each in sensor.components])
+            sensor.name: np.array([value.unit(f"{sensor.name}_{each.name}") for each in sensor.fields])
             for sensor in spec.measurements
         }
         self.x_periods = np.array([_period(state.period, spec) for state in spec.states])
         self.z_periods: dict[str, Array] = {
-            sensor.name: np.array([_period(each.period, spec) for each in sensor.components])
+            sensor.name: np.array([_period(getattr(each, "period", None), spec) for each in sensor.fields])
             for sensor in spec.measurements
         }
         self.reading_periods: Array = np.concatenate([np.empty(0), *self.z_periods.values()])
         self.readings: Array = np.concatenate([np.empty(0), *self.z.values()])  # all sensors' z, one after the other
-        self.R: dict[str, Array] = {name: np.outer(z, z) / value.one for name, z in self.z.items()}
+        sizes = {sensor.name: len(sensor.components) for sensor in spec.measurements}
+        self.R: dict[str, Array] = {s: np.outer(z[: sizes[s]], z[: sizes[s]]) / value.one for s, z in self.z.items()}
+        self.outputs: Array = np.array([value.unit(each.name) for each in spec.outputs])
         self.parameters = {each.name: value.unit(each.name) for each in spec.parameters}
         run_time = spec.dt is not None and spec.dt.run_time
         self.dt = value.unit("dt") if run_time else 1.0

@@ -105,6 +105,10 @@ class Estimator(ABC):
         """The estimate with P (n, n) for its covariance, or for that of every filter of a bank; x stays."""
 
     @abstractmethod
+    def respread(self, estimate: Estimate, change: Callable[[Matrix], Matrix]) -> Estimate:
+        """The estimate with P (n, n), or the P of every filter of a bank, changed; x stays."""
+
+    @abstractmethod
     def redrawn(self, estimate: Estimate) -> Estimate:
         """The estimate without the points kept for an update, which then draws its own."""
 
@@ -140,6 +144,9 @@ class Algorithm(Estimator):
 
     def with_covariance(self, estimate: Estimate, P: Matrix) -> Estimate:
         return replace(estimate, P=P, memory=None)
+
+    def respread(self, estimate: Estimate, change: Callable[[Matrix], Matrix]) -> Estimate:
+        return self.with_covariance(estimate, change(estimate.P))
 
     def redrawn(self, estimate: Estimate) -> Estimate:
         return replace(estimate, memory=None)

@@ -110,6 +110,10 @@ class Bank(Estimator):
         """mu stays; where the modes differ in x the combined covariance is P and their spread."""
         return self._changed(estimate, lambda algorithm, mode: algorithm.with_covariance(mode, P))
 
+    def respread(self, estimate: Estimate, change: Callable[[Matrix], Matrix]) -> Estimate:
+        """mu stays."""
+        return self._changed(estimate, lambda algorithm, mode: algorithm.respread(mode, change))
+
     def reweighed(self, estimate: Estimate, mu: Vector) -> Estimate:
         """With other probabilities (B) of the modes."""
         return self._combined(mu / np.sum(mu), _bank(estimate).modes)

@@ -10,15 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kfgen.reference.algorithm import Correction, Estimator
+from kfgen.reference.arguments import components_used, own_inputs
 from kfgen.reference.clock import Clock, step_of
 from kfgen.reference.dual import Matrix, Vector
+from kfgen.reference.first import Rule
 from kfgen.reference.linalg import lower_root, udu
 from kfgen.reference.log import Run, replay
-from kfgen.reference.mode import ModeView
+from kfgen.reference.mode import ModeView, is_root, keeps_points
 from kfgen.reference.model import Context, Model, fixed_step
+from kfgen.reference.outputs import Outputs
 from kfgen.reference.parameters import Parameters
 from kfgen.reference.reading import Read
-from kfgen.reference.sensor import Reading, SensorModel
+from kfgen.reference.sensor import Reading
 from kfgen.reference.status import Status, StepError
 from kfgen.spec.types import Filter, Spec
 
@@ -47,6 +50,10 @@ class ReferenceFilter:
         self._step = step_of(spec, self.model.number)
         self._fixed = fixed_step(spec)
         self._read = Read(spec)
+        self._outputs = Outputs(self.model)
+        self._firsts = {rule.sensor: Rule(self.model, rule) for rule in spec.initialize}
+        for rule in self._firsts.values():
+            self.sensors[rule.sensor].takes_inputs |= bool(rule.read & set(self.model.inputs))
         self.init()
 
     @property
@@ -59,7 +66,7 @@ class ReferenceFilter:
 
     @property
     def sqrt_covariance(self) -> Matrix:
-        self._require("sqrt_covariance", self._any(_is_root), "covariance: sqrt")
+        self._require("sqrt_covariance", self._any(is_root), "covariance: sqrt")
         return lower_root(self._estimate.P)
 
     @property
@@ -74,6 +81,23 @@ class ReferenceFilter:
         self._require("Q", Q is not None, "adapt_Q")
         assert Q is not None
         return Q.copy()
+
+    @property
+    def outputs(self) -> dict[str, float]:
+        """The spec's outputs at x, by name."""
+        self._require("outputs", bool(self.spec.outputs), "outputs")
+        return self._outputs.values(self._estimate, self._now)
+
+    @property
+    def output_std(self) -> dict[str, float]:
+        """Their standard deviations, to first order."""
+        self._require("output_std", bool(self.spec.outputs), "outputs")
+        return self._outputs.deviations(self._estimate, self._now)
+
+    @property
+    def _now(self) -> Context:
+        step = math.nan if self._fixed is None else float(self._fixed)
+        return Context(self.parameters, np.zeros(len(self.model.inputs)), self._clock.now, step)
 
     @property
     def mu(self) -> Vector:
@@ -118,7 +142,7 @@ class ReferenceFilter:
         self.nis_of_modes = (0.0,) * len(self.algorithm.options)
         self.log_likelihood = 0.0
         self.gate_count = dict.fromkeys(self.sensors, 0)
-        self._uninitialised = self.spec.initialize is not None
+        self._awaited = set(self._firsts)
         return int(Status.OK)
 
     def set_state(self, x: ArrayLike) -> int:
@@ -156,7 +180,7 @@ class ReferenceFilter:
 
         NOT_FINITE leaves the filter as it was. The sign of a column makes no difference to P.
         """
-        self._require("set_sqrt_covariance", self._any(_is_root), "covariance: sqrt")
+        self._require("set_sqrt_covariance", self._any(is_root), "covariance: sqrt")
         self._require_variable()
         root = np.tril(np.array(S, dtype=np.float64).reshape(self.model.n, self.model.n))
         with np.errstate(all="ignore"):
@@ -168,7 +192,7 @@ class ReferenceFilter:
 
     def redraw(self) -> int:
         """Draws the points that predict has kept for an update anew, from x and P (`redraw: false` only)."""
-        self._require("redraw", self._any(_keeps_points), "redraw: false")
+        self._require("redraw", self._any(keeps_points), "redraw: false")
         self._estimate = self.algorithm.redrawn(self._estimate)
         return int(Status.OK)
 
@@ -177,6 +201,8 @@ class ReferenceFilter:
         inputs = self._inputs(u, needed=bool(self.model.inputs))
         if self._step.run_time and dt is None:
             raise TypeError("predict: this filter takes dt")
+        if self._waits:
+            return int(Status.OK)
         try:
             step, flags = self._step.nominal, Status.OK
             self._test(self._read.predict, inputs)
@@ -195,22 +221,32 @@ class ReferenceFilter:
         return int(flags | warnings)
 
     def update(
-        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None
-    ) -> int:
-        """An update with z (m); u (nu) where the sensor takes inputs; mask: bit i for component i."""
+        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None,
+        inputs: ArrayLike | Mapping[str, float] | None = None,
+    ) -> int:  # fmt: skip
+        """An update with z (m); u (nu) where the sensor takes inputs; mask: bit i for component i; inputs: the
+        sensor's own, in order or by name, where it has some."""
         model = self.sensors[sensor]
         measured = np.array(z, dtype=np.float64).reshape(model.m)
-        inputs = self._inputs(u, needed=model.takes_inputs)
-        used = _used(model, mask)
-        if not used:
+        given = self._inputs(u, needed=model.takes_inputs)
+        own = own_inputs(model, inputs)
+        used = components_used(model, mask)
+        if not used or (self._waits and sensor not in self._awaited):
             return int(Status.OK)
-        reading = Reading(model, measured, used, Context(self.parameters, inputs, self._clock.now, 0.0))
+        reading = Reading(model, measured, used, Context(self.parameters, given, self._clock.now, 0.0, own))
         try:
-            self._test(self._read.update(sensor, used), inputs)
+            first = self._first(reading)
+            read = self._read.update(sensor, used) | (first.read if first is not None else frozenset())
+            self._test(read, given, dict(zip(model.own, own.tolist(), strict=True)))
             if not np.isfinite(measured[list(used)]).all():
                 raise StepError(Status.NOT_FINITE)
-            if self._initialises(reading):
-                return int(self._initialise(reading))
+            if first is not None:
+                self._estimate = first.apply(self.algorithm, self._estimate, reading)
+                self._awaited.remove(sensor)
+                self.nis = 0.0
+                return int(Status.OK)
+            if self._waits:
+                return int(Status.OK)
             with np.errstate(all="ignore"):
                 return int(self._judge(reading))
         except StepError as error:
@@ -229,11 +265,21 @@ class ReferenceFilter:
             return np.zeros(len(self.model.inputs))
         return np.array(u, dtype=np.float64).reshape(len(self.model.inputs))
 
-    def _test(self, read: frozenset[str], inputs: Vector) -> None:
-        """Raises NOT_FINITE for an input or a parameter that is read and is not finite."""
-        given = {**dict(zip(self.model.inputs, map(float, inputs), strict=True)), **self.parameters}
+    def _test(self, read: frozenset[str], inputs: Vector, own: Mapping[str, float] | None = None) -> None:
+        """Raises NOT_FINITE for an input or a parameter that is read and is not finite. own: a sensor's inputs."""
+        given = {**dict(zip(self.model.inputs, map(float, inputs), strict=True)), **self.parameters, **(own or {})}
         if not all(math.isfinite(value) for name, value in given.items() if name in read):
             raise StepError(Status.NOT_FINITE)
+
+    @property
+    def _waits(self) -> bool:
+        """Whether nothing is done until other sensors have come."""
+        return any(self._firsts[sensor].waits for sensor in self._awaited)
+
+    def _first(self, reading: Reading) -> Rule | None:
+        """What a reading sets, where it is the first complete one of a sensor that sets something."""
+        rule = self._firsts.get(reading.sensor.name)
+        return rule if rule and rule.sensor in self._awaited and rule.complete(reading) else None
 
     def _judge(self, reading: Reading) -> Status:
         """An update behind the gate: the whole vector, or nothing of it."""
@@ -251,47 +297,3 @@ class ReferenceFilter:
         self.nis_of_modes = self.algorithm.nis_of_modes(innovation)
         self.gate_count[name] = 0
         return verdict | correction.flags
-
-    def _initialises(self, reading: Reading) -> bool:
-        """Whether this reading is the first one of the sensor that sets the initial states."""
-        rule = self.spec.initialize
-        if rule is None or not self._uninitialised or rule.sensor != reading.sensor.name:
-            return False
-        components = reading.sensor.components
-        return all(components.index(component) in reading.used for component in rule.states.values())
-
-    def _initialise(self, reading: Reading) -> Status:
-        """Sets the states that the spec names from the reading; the covariance stays, no update is made."""
-        rule = self.spec.initialize
-        assert rule is not None
-        components = reading.sensor.components
-        entries = {self.model.index[state]: components.index(component) for state, component in rule.states.items()}
-
-        def change(x: Vector) -> Vector:
-            x = x.copy()
-            x[list(entries)] = reading.z[list(entries.values())]
-            return self.model.wrap(self.model.clip(x))
-
-        self._estimate = self.algorithm.placed(self._estimate, change)
-        self._uninitialised = False
-        self.nis = 0.0
-        return Status.OK
-
-
-def _is_root(options: Filter) -> bool:
-    return options.covariance == "sqrt"
-
-
-def _keeps_points(options: Filter) -> bool:
-    return options.sigma_points is not None and not options.sigma_points.redraw
-
-
-def _used(sensor: SensorModel, mask: int | Sequence[bool] | None) -> tuple[int, ...]:
-    """The components that a mask selects; all without one."""
-    if mask is None:
-        return tuple(range(sensor.m))
-    if not sensor.partial:
-        raise TypeError(f"sensor {sensor.name} takes no mask")
-    if isinstance(mask, int | np.integer):
-        return tuple(i for i in range(sensor.m) if int(mask) >> i & 1)
-    return tuple(i for i, bit in enumerate(mask) if bit)

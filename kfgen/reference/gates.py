@@ -40,7 +40,8 @@ class Gates:
         """The formula of a sensor's gate, or its chi-square quantile with so many components."""
         name, used = reading.sensor.name, len(reading.used)
         if name in self._formulas:
-            value = value_of(self._formulas[name](self.model.environment(reading.context, self.model.x0)))
+            given = self.model.environment(reading.context, self.model.x0, own=reading.sensor.own)
+            value = value_of(self._formulas[name](given))
             if not math.isfinite(value):
                 raise StepError(Status.NOT_FINITE)
             return value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ class Run:
 
     x (r, n), var (r, n): the estimate and the diagonal of its covariance. nis: sensor -> (r), NaN in rows
     without an update of it (or with one that failed). status (r): the bits of the row's calls, or-ed. mu (r, B):
-    the probabilities of the modes of an imm, else None.
+    the probabilities of the modes of an imm, else None. outputs, output_std: name -> (r), of a spec with outputs.
     """
 
     x: Matrix
@@ -28,15 +28,18 @@ class Run:
     nis: dict[str, Vector]
     status: NDArray[np.int64]
     mu: Matrix | None = None
+    outputs: dict[str, Vector] = field(default_factory=dict)
+    output_std: dict[str, Vector] = field(default_factory=dict)
 
 
 def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
     """Per row: predict, then the updates in the spec's order.
 
-    The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`) to values, NaN where there is no
-    measurement. Run-time dt: t minus the last row's t, no predict in the first row and for equal t; fixed dt:
-    one predict per row, where there is a t none for equal t. A sensor with missing components is updated with the
-    others where it is `partial`, and not at all where it is not. Raises ValueError for a missing column (all columns
+    The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`, `<sensor>.<its own input>`) to values, NaN where
+    there is no measurement. Run-time dt: t minus the last row's t, no predict in the first row and for equal t; fixed
+    dt: one predict per row, where there is a t none for equal t. A sensor with missing components is updated with the
+    others where it is `partial`, and not at all where it is not, or where one of its inputs is missing.
+    Raises ValueError for a missing column (all columns
     of a sensor may be missing).
     """
     columns = {name: np.asarray(column, dtype=np.float64) for name, column in log.items()}
@@ -50,7 +53,7 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
     inputs = np.column_stack([columns[name] for name in kf.model.inputs] or [np.zeros((rows, 0))])
     readings: dict[str, Matrix] = {}
     for sensor in kf.sensors.values():
-        names = [f"{sensor.name}.{component}" for component in sensor.components]
+        names = [f"{sensor.name}.{name}" for name in (*sensor.components, *sensor.own)]
         if any(name in columns for name in names):
             absent = np.full(rows, math.nan)
             readings[sensor.name] = np.column_stack([columns.get(name, absent) for name in names])
@@ -80,17 +83,22 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
         result.x[row], result.var[row] = kf.x, kf.P.diagonal()
         if result.mu is not None:
             result.mu[row] = kf.mu
+        if kf.spec.outputs:
+            for course, told in ((result.outputs, kf.outputs), (result.output_std, kf.output_std)):
+                for name, number in told.items():
+                    course.setdefault(name, np.zeros(rows))[row] = number
     return result
 
 
 def _measure(kf: Replayed, name: str, z: Vector, u: Vector | None, result: Run, row: int) -> int:
     """One sensor of one row: its status, 0 where there is nothing to do."""
     sensor = kf.sensors[name]
+    z, own = np.split(z, [sensor.m])
     present = ~np.isnan(z)
-    if not np.any(present) or not (sensor.partial or np.all(present)):
+    if np.any(np.isnan(own)) or not np.any(present) or not (sensor.partial or np.all(present)):
         return 0
     mask = sum(1 << i for i in range(sensor.m) if present[i]) if sensor.partial else None
-    status = kf.update(name, z, u if sensor.takes_inputs else None, mask)
+    status = kf.update(name, z, u if sensor.takes_inputs else None, mask, own if sensor.own else None)
     if status < Status.ERROR:
         result.nis[name][row] = kf.nis
     return status

@@ -54,3 +54,11 @@ class ModeView:
 
     def _missing(self, what: str, option: str) -> AttributeError:
         return AttributeError(f"mode {self.name} has no {what}; its filter has no `{option}`")
+
+
+def is_root(options: Filter) -> bool:
+    return options.covariance == "sqrt"
+
+
+def keeps_points(options: Filter) -> bool:
+    return options.sigma_points is not None and not options.sigma_points.redraw

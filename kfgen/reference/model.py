@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
@@ -28,13 +28,14 @@ class Context:
     """What a step is given beside the state.
 
     parameters: by name. u (nu): the inputs. t: seconds since init at the step's start (in an update: now).
-    dt: the step in s (0 in an update).
+    dt: the step in s (0 in an update). own: of an update, the sensor's own inputs.
     """
 
     parameters: Mapping[str, float]
     u: Vector
     t: float
     dt: float
+    own: Vector = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,11 @@ class Model:
         }
         noises = [noise.name for sensor in spec.measurements for noise in sensor.noise]
         noises += [noise.name for noise in spec.noise]
+        # what comes with measurements; two sensors may call theirs alike
+        given = [entry.name for sensor in spec.measurements for entry in sensor.inputs]
+        given += [measured(sensor.name, c.name) for sensor in spec.measurements for c in sensor.components]
         own = ("t", "dt", Z, PREDICTED, INNOVATION)
-        self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, *own))
+        self.scope = Scope(constants, (*parameters, *self.states, *self.inputs, *noises, *given, *own))
         self._noise_slots = tuple(self.scope.slots[name] for name in noises)
         self._state_slots = tuple(self.scope.slots[name] for name in self.states)
         self._input_slots = tuple(self.scope.slots[name] for name in self.inputs)
@@ -107,9 +111,10 @@ class Model:
         return value_of(self.scope.compile(expression)(environment))
 
     def environment(
-        self, context: Context, x: Sequence[Number] | Vector, noise: Mapping[str, Number] | None = None
-    ) -> Environment:
-        """An environment with the states at x (n); noises are 0 unless given."""
+        self, context: Context, x: Sequence[Number] | Vector, noise: Mapping[str, Number] | None = None,
+        own: Sequence[str] = (),
+    ) -> Environment:  # fmt: skip
+        """An environment with the states at x (n); noises are 0 unless given. own: names of the sensor's inputs."""
         environment, slots = self.scope.empty(), self.scope.slots
         for name, parameter in context.parameters.items():
             environment[slots[name]] = parameter
@@ -118,6 +123,8 @@ class Model:
         for slot, number in zip(self._state_slots, x.tolist() if isinstance(x, np.ndarray) else x, strict=True):
             environment[slot] = float(number) if isinstance(number, np.floating) else number
         environment[slots["t"]], environment[slots["dt"]] = context.t, context.dt
+        for name, entry in zip(own, context.own.tolist(), strict=True):
+            environment[slots[name]] = entry
         for slot in self._noise_slots:
             environment[slot] = 0.0
         for name, number in (noise or {}).items():
@@ -174,6 +181,11 @@ class Model:
                 "check variances and covariances",
             ) from None
         return P
+
+
+def measured(sensor: str, component: str) -> str:
+    """The variable of a component in what its first measurement sets: it hides what has its name outside."""
+    return f" {sensor}.{component}"
 
 
 def wrap(x: float, period: float) -> float:

@@ -32,8 +32,15 @@ class Replayed(Protocol):
     @property
     def mu(self) -> Vector: ...
 
+    @property
+    def outputs(self) -> dict[str, float]: ...
+
+    @property
+    def output_std(self) -> dict[str, float]: ...
+
     def predict(self, u: ArrayLike | None = None, dt: float | None = None) -> int: ...
 
     def update(
-        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None
-    ) -> int: ...
+        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None,
+        inputs: ArrayLike | Mapping[str, float] | None = None,
+    ) -> int: ...  # fmt: skip

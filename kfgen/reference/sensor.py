@@ -43,8 +43,8 @@ class Linearisation:
 class SensorModel:
     """One sensor of a spec.
 
-    Attributes: name; components: their names; m: how many; takes_inputs: whether h, R or what they use
-    contain inputs, so that an update needs u; partial: whether an update may be masked; bent: for each
+    Attributes: name; components: their names; m: how many; own: the names of its inputs; takes_inputs: whether h, R or
+    what they use contain inputs, so that an update needs u; partial: whether an update may be masked; bent: for each
     component, whether its differences are other than z - h.
     """
 
@@ -54,6 +54,7 @@ class SensorModel:
         self.name = sensor.name
         self.components = tuple(component.name for component in sensor.components)
         self.m = len(self.components)
+        self.own = tuple(entry.name for entry in sensor.inputs)
         self.partial = sensor.partial
         self._h = [model.scope.compile(component.h) for component in sensor.components]
         self._periods = [
@@ -73,7 +74,7 @@ class SensorModel:
 
     def predict(self, x: Sequence[Number], e: Sequence[Number], context: Context, used: Sequence[int]) -> list[Number]:
         """h of the components in use at the state x (n) and the noise inputs e."""
-        environment = self.model.environment(context, x, dict(zip(self._noises, e, strict=True)))
+        environment = self.model.environment(context, x, dict(zip(self._noises, e, strict=True)), self.own)
         return [self._h[i](environment) for i in used]
 
     def linearise(self, x: Vector, reading: Reading, learnt: bool = False) -> Linearisation:
@@ -94,11 +95,11 @@ class SensorModel:
 
     def noise(self, x: Vector, context: Context, used: Sequence[int] | None = None) -> Matrix:
         """R (k, k) of the components in use at x (n), without the noise inputs."""
-        return self._R(self.model.environment(context, x), used)
+        return self._R(self.model.environment(context, x, own=self.own), used)
 
     def input_covariance(self, x: Vector, context: Context) -> Matrix:
         """The covariance of the sensor's noise inputs at x (n)."""
-        return self._Re(self.model.environment(context, x))
+        return self._Re(self.model.environment(context, x, own=self.own))
 
     def jacobian(self, x: Vector, reading: Reading) -> Matrix:
         """H (k, n) of the components in use at x (n); may be NaN."""
@@ -137,7 +138,7 @@ class SensorModel:
         wrapped: the components that are, if not all. An own residual may use x (n) as h does. Raises StepError
         NOT_FINITE.
         """
-        environment = self.model.environment(reading.context, x)
+        environment = self.model.environment(reading.context, x, own=self.own)
         y = np.zeros(len(reading.used))
         for k, i in enumerate(reading.used):
             measured, predicted = float(z[k]), float(h[k])

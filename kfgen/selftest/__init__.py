@@ -41,14 +41,15 @@ class Array:
 
 @dataclass(frozen=True)
 class Update:
-    """A sensor's update: its components, where they stand in a step's readings; it comes in each `every`-th step."""
+    """A sensor's update: the fields of its struct, where they stand in a step's readings; it comes in each `every`-th
+    step."""
 
     name: str
-    components: tuple[str, ...]
+    fields: tuple[str, ...]
     first: int
     every: int
     arguments: str
-    read: tuple[str, ...] = ()  # the inputs that it reads
+    tested: tuple[str, ...] = ()  # what it refuses where it is not finite: `z_gnss.x`, `u.gyro`
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,7 @@ class SelfTest:
     arrays: tuple[Array, ...]
     near: Nearness | None  # None: to the bit
     read: tuple[str, ...] = ()  # the inputs that a prediction reads
+    outputs: tuple[str, ...] = ()
 
 
 def selftest(spec: Spec, generated: Generated, track: Track | None = None) -> dict[str, str]:
@@ -106,9 +108,12 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
     first = 0
     for sensor in spec.measurements:
         takes_u = declared.takes(f"update_{sensor.name}", "u")
-        names = tuple(component.name for component in sensor.components)
-        read = _read(spec, generated, f"update_{sensor.name}")
-        sensors.append(Update(sensor.name, names, first, 1 + len(sensors), ", &u" if takes_u else "", read))
+        names = tuple(each.name for each in sensor.fields)
+        read = _read(generated, f"update_{sensor.name}")
+        tested = [f"z_{sensor.name}.{component.name}" for component in sensor.components]
+        tested += [f"z_{sensor.name}.{own.name}" for own in sensor.inputs if f"z.{own.name}" in read]
+        tested += [f"u.{each.name}" for each in spec.inputs if f"u.{each.name}" in read]
+        sensors.append(Update(sensor.name, names, first, 1 + len(sensors), ", &u" if takes_u else "", tuple(tested)))
         first += len(names)
     takes = [name for name in ("u", "dt") if declared.takes("predict", name)]
     uses_u = "u" in takes or any(each.arguments for each in sensors)
@@ -127,6 +132,12 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
         arrays.append(_array("spread", "the largest variance of each state", largest, scalar))
     if found.variance is not None:
         arrays.append(_array("variances", "the diagonal of P after each step", found.variance.ravel(), scalar))
+    if spec.outputs:
+        arrays.append(_array("told", "the outputs after each step", found.outputs.ravel(), scalar))
+        arrays.append(_array("deviations", "their standard deviations", found.deviations.ravel(), scalar))
+        if not exact:
+            arrays.append(_array("sizes", "the largest of each output", abs(found.outputs).max(axis=0), scalar))
+            arrays.append(_array("wide", "and of their deviations", found.deviations.max(axis=0), scalar))
     kinds = [(state.name, state.period) for state in spec.states if not exact]
     periods = [
         (name, scalar.literal(Fraction(float(value(period.tree, spec)))))
@@ -137,15 +148,16 @@ def _view(spec: Spec, generated: Generated, scalar: Scalar, found: Record) -> Se
         generated.view, f"{generated.view.command} --selftest", len(found.x), tuple(i.name for i in spec.inputs) if
         uses_u else (), tuple(sensors), first, "".join({"u": ", &u", "dt": ", dt"}[name] for name in takes),
         "dt" in takes, found.variance is not None, tuple(periods), tuple(arrays),
-        None if exact else _nearness(spec, scalar, found.tolerance), _read(spec, generated, "predict"),
+        None if exact else _nearness(spec, scalar, found.tolerance),
+        tuple(each.name for each in spec.inputs if f"u.{each.name}" in _read(generated, "predict")),
+        tuple(output.name for output in spec.outputs),
     )  # fmt: skip
 
 
-def _read(spec: Spec, generated: Generated, function: str) -> tuple[str, ...]:
-    """The inputs that a function of the filter reads."""
+def _read(generated: Generated, function: str) -> set[str]:
+    """What a function of the filter reads of what it is given."""
     (body,) = [f.body for f in generated.code.functions if f.name == function]
-    found = given(walk(body))
-    return tuple(each.name for each in spec.inputs if f"u.{each.name}" in found)
+    return given(walk(body))
 
 
 def _nearness(spec: Spec, scalar: Scalar, tolerance: float) -> Nearness:

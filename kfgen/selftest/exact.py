@@ -7,11 +7,13 @@ import numpy as np
 from kfgen.emit.declarations import Declarations
 from kfgen.errors import KfgenError
 from kfgen.filters.base import FilterCode
+from kfgen.filters.steps.outputs import DEVIATION, FUNCTION, VALUE
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.ir import interpret
 from kfgen.native.values import Units, value_of
 from kfgen.selftest.record import Record
 from kfgen.selftest.track import Track
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 from kfgen.status import ERROR, Status
 
@@ -26,7 +28,7 @@ class Twin:
         self.scalar = scalar
         self.memory = interpret.Memory()
         self._functions = {each.name: each for each in code.functions}
-        spec = code.model.spec
+        self.spec = spec = code.model.spec
         self.memory.arrays["P"] = [0] * len(spec.states) ** 2
         for name, indices in code.constants.items():
             self.memory.arrays[f"{spec.name}_{name}"] = list(indices)
@@ -42,6 +44,14 @@ class Twin:
         flags = interpret.run(self._functions[function], self.scalar, self.memory)
         status = sum(int(Status[flag]) for flag in flags)
         return status if status >= ERROR or status & _ALONE else status | self.scalar.status.bits
+
+    def outputs(self) -> tuple[list[int], list[int]]:
+        """The outputs and their standard deviations, where there are some."""
+        names = [output.name for output in self.spec.outputs]
+        if names:
+            self.call(FUNCTION)
+        told = [[self.memory.numbers[f"{argument}.{name}"] for name in names] for argument in (VALUE, DEVIATION)]
+        return told[0], told[1]
 
     @property
     def x(self) -> list[int]:
@@ -64,7 +74,7 @@ def record_exactly(spec: Spec, code: FilterCode, scalar: Fixed, declared: Declar
     twin = Twin(code, scalar)
     status = twin.call("init")
     covariance = declared.has("get_covariance")
-    xs, variances, statuses = [], [], []
+    xs, variances, statuses, told = [], [], [], []
     for k in range(len(dt)):
         if status < ERROR:
             status = _step(spec, twin, u[k].tolist(), dt[k].item(), z[k].tolist(), k)
@@ -73,24 +83,26 @@ def record_exactly(spec: Spec, code: FilterCode, scalar: Fixed, declared: Declar
         xs.append(twin.x)
         variances.append(twin.variances if covariance else [])
         statuses.append(status)
+        told.append(twin.outputs())
     if not xs:
         raise KfgenError(f"{spec.name}: the filter does not get through one step of a simulated run")
     x = np.array(xs, dtype=np.float64)
     variance = np.array(variances, dtype=np.float64) if covariance else None
     steps = Track(u.astype(np.float64), dt.astype(np.float64), z.astype(np.float64)).first(len(xs))
-    return Record(steps, x, variance, 0.0, np.zeros(x.shape[1]), tuple(statuses))
+    outputs = np.array(told, dtype=np.float64).reshape(-1, 2, len(spec.outputs))
+    return Record(
+        steps, x, variance, 0.0, np.zeros(x.shape[1]), tuple(statuses), outputs[:, 0], outputs[:, 1],
+    )  # fmt: skip
 
 
 def _step(spec: Spec, twin: Twin, u: list[int], dt: int, z: list[int], k: int) -> int:
     """The calls of a step; all that they tell."""
     given = twin.memory.numbers
     given.update({"dt": dt, **{f"u.{each.name}": raw for each, raw in zip(spec.inputs, u, strict=True)}})
-    status, first = twin.call("predict"), 0
-    for i, sensor in enumerate(spec.measurements):
-        last = first + len(sensor.components)
+    status = twin.call("predict")
+    for i, (sensor, place) in enumerate(readings_of(spec)):
         if k % (i + 1) == 0 and status < ERROR:
-            names = [f"z.{each.name}" for each in sensor.components]
-            given.update(zip(names, z[first:last], strict=True))
+            names = [f"z.{each.name}" for each in sensor.fields]
+            given.update(zip(names, z[place], strict=True))
             status |= twin.call(f"update_{sensor.name}")
-        first = last
     return status

@@ -7,7 +7,7 @@ departs from the one that is not; a self-test that fails then tells of the compi
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from kfgen.reference import ReferenceFilter, reference
 from kfgen.reference.status import Status
 from kfgen.scalar_names import DOUBLE, FLOAT
 from kfgen.selftest.track import Track
+from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -34,7 +35,8 @@ FINEST = {FLOAT: 2.0**-22, DOUBLE: 2.0**-44}
 class Record:
     """The track, x [k, n] and the diagonal of P [k, n] after each step (None where a filter keeps no covariance).
 
-    Where statuses are given, one of each step, all are raw numbers of the scalar type that must come out to the bit;
+    outputs, deviations (k, outputs): what the filter tells after each step. Where statuses are given, one of each step,
+    all are raw numbers of the scalar type that must come out to the bit;
     else tolerance says how near.
     """
 
@@ -44,6 +46,8 @@ class Record:
     tolerance: float
     initial: Array  # the diagonal of P before the first step [n]
     statuses: tuple[int, ...] | None = None
+    outputs: Array = field(default_factory=lambda: np.empty((0, 0)))
+    deviations: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 def record(spec: Spec, track: Track) -> Record:
@@ -55,6 +59,7 @@ def record(spec: Spec, track: Track) -> Record:
     n = len(spec.states)
     initial = np.zeros(n) if steady else np.diag(ref.P).copy()
     xs, variances = [], []
+    told: list[tuple[list[float], list[float]]] = []
     with np.errstate(all="ignore"):
         for k in range(len(track.dt)):
             if not _stepped(spec, ref, track, k) or not _stepped(spec, coarse, track, k, rounded=True):
@@ -62,6 +67,10 @@ def record(spec: Spec, track: Track) -> Record:
             variance = np.zeros(n) if steady else np.diag(ref.P).copy()
             if not steady and not _near(ref, coarse, variance):
                 break
+            if spec.outputs:
+                told.append((list(ref.outputs.values()), list(ref.output_std.values())))
+                if not _tells(told[-1], coarse):
+                    break
             xs.append(ref.x.copy())
             variances.append(variance)
     if not xs:
@@ -72,7 +81,14 @@ def record(spec: Spec, track: Track) -> Record:
     quantum = np.maximum(sigma * tolerance / 64, np.abs(x).max(axis=0) * FINEST[spec.scalar])
     x = np.array([[_rounded(v, q) for v, q in zip(*rows, strict=True)] for rows in zip(x, quantum, strict=True)])
     variance = np.array([[_rounded(v, abs(v) * tolerance / 64) for v in row] for row in variance])
-    return Record(track.first(len(x)), x, None if steady else variance, tolerance, initial)
+    outputs = np.array(told[: len(x)]).reshape(-1, 2, len(spec.outputs))
+    y, deviation = outputs[:, 0], outputs[:, 1]
+    fine = np.maximum(deviation * tolerance / 64, np.abs(y).max(axis=0, initial=0.0) * FINEST[spec.scalar])
+    y = np.array([[_rounded(v, q) for v, q in zip(*rows, strict=True)] for rows in zip(y, fine, strict=True)])
+    deviation = np.array([[_rounded(v, abs(v) * tolerance / 64) for v in row] for row in deviation])
+    return Record(
+        track.first(len(x)), x, None if steady else variance, tolerance, initial, None, y, deviation,
+    )  # fmt: skip
 
 
 def _near(ref: ReferenceFilter, coarse: ReferenceFilter, variance: Array) -> bool:
@@ -81,6 +97,13 @@ def _near(ref: ReferenceFilter, coarse: ReferenceFilter, variance: Array) -> boo
     allowed = TOLERANCES[FLOAT] / 8 * np.sqrt(np.maximum(variance, 0.0)) + 1e-6 * np.abs(ref.x)
     apart = np.abs(np.diag(coarse.P) - variance) > TOLERANCES[FLOAT] / 8 * variance + 1e-6 * np.max(variance)
     return not (np.any(error > allowed) or np.any(apart))
+
+
+def _tells(told: tuple[list[float], list[float]], coarse: ReferenceFilter) -> bool:
+    """Whether outputs and their deviations are finite, and no rounding has them jump."""
+    apart = np.abs(np.array(told) - [list(coarse.outputs.values()), list(coarse.output_std.values())])
+    y, deviation = map(np.abs, told)
+    return bool(np.all(apart <= TOLERANCES[FLOAT] / 8 * deviation + 1e-6 * np.array([y, deviation])))
 
 
 def _stepped(spec: Spec, kf: ReferenceFilter, track: Track, k: int, rounded: bool = False) -> bool:
@@ -97,12 +120,10 @@ def _statuses(spec: Spec, kf: ReferenceFilter, track: Track, k: int) -> Iterator
     u = track.u[k] if spec.inputs else None
     run_time = spec.dt is not None and spec.dt.run_time
     yield kf.predict(u=u, dt=float(track.dt[k])) if run_time else kf.predict(u=u)
-    first = 0
-    for i, sensor in enumerate(spec.measurements):
-        last = first + len(sensor.components)
+    for i, (sensor, place) in enumerate(readings_of(spec)):
         if k % (i + 1) == 0:
-            yield kf.update(sensor.name, track.z[k, first:last], u=u)
-        first = last
+            z, own = np.split(track.z[k, place], [len(sensor.components)])
+            yield kf.update(sensor.name, z, u=u, inputs=own if sensor.inputs else None)
 
 
 def _rounded(value: float, quantum: float) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.simulate import simulate
+from kfgen.spec.sensors import columns_of
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -50,7 +51,8 @@ class Dice:
 
 @dataclass(frozen=True)
 class Track:
-    """k steps: u [k, inputs], dt [k] s, z [k, components of all sensors]; sensor i measures in each (i+1)-th."""
+    """k steps: u [k, inputs], dt [k] s, z [k, components and own inputs of all sensors]; sensor i measures in each
+    (i+1)-th."""
 
     u: Array
     dt: Array
@@ -62,14 +64,14 @@ class Track:
 
 def track_of(spec: Spec) -> Track:
     """A track drawn from the model, of numbers that a float carries."""
-    n, m = len(spec.states), sum(len(sensor.components) for sensor in spec.measurements)
+    n, m = len(spec.states), sum(len(sensor.fields) for sensor in spec.measurements)
     steps = min(max(NUMBERS // (2 * n + m + len(spec.inputs)), STEPS.start), STEPS.stop - 1)
     # one row more: a run-time dt begins with the second
     log = simulate(spec, steps + 1, draws=Dice(spec.name))
     columns = {name: column[1:] for name, column in log.columns.items()}
     run_time = spec.dt is not None and spec.dt.run_time
     dt = np.diff(log.columns["t"]) if run_time else np.zeros(steps)
-    names = [f"{sensor.name}.{each.name}" for sensor in spec.measurements for each in sensor.components]
+    names = [name for sensor in spec.measurements for name in columns_of(sensor)]
     z = np.column_stack([columns[name] for name in names])
     u = np.column_stack([columns[each.name] for each in spec.inputs]) if spec.inputs else np.empty((steps, 0))
     return Track(_single(u), _single(dt), _single(z))

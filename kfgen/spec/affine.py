@@ -14,8 +14,8 @@ from fractions import Fraction
 import mpmath
 
 from kfgen.spec.constants import NotConstant, keep, value
+from kfgen.spec.contexts import Context
 from kfgen.spec.operations import DIGITS, NoValue, Value, real
-from kfgen.spec.scopes import Context
 from kfgen.spec.tree import Call, Name, Tree
 
 

@@ -1,88 +1,82 @@
 """The whitelist parser: text of an expression -> tree. Nothing is ever evaluated.
 
 A small operator-precedence parser over ASCII tokens, with Python's precedence: `or`, `and`, `not`,
-comparison, `+ -`, `* /`, unary minus, `**` (to the right). What is not in the grammar cannot be said.
+comparison, `+ -`, `* / @`, unary minus, `**` (to the right). What is not in the grammar cannot be said.
+
+What is parsed is the source: it may hold vectors (`list`, `part.x`, `index`, `matmul`, functions of vectors, and
+`chain`, a long sum or product), of which `shaping` makes trees of numbers, as soon as the shapes of names are known.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
+from kfgen.spec.calls import MAX_NESTING as MAX_NESTING
+from kfgen.spec.calls import MAX_NODES as MAX_NODES
+from kfgen.spec.calls import Calls
 from kfgen.spec.lexer import ExpressionError, Token, number, tokenize
-from kfgen.spec.problems import did_you_mean, short
-from kfgen.spec.tree import FUNCTIONS, Call, Name, Number, Tree
+from kfgen.spec.tree import FUNCTIONS, OPERATORS, Call, Number, Tree
 
 MAX_LENGTH = 10_000
-MAX_NODES = 2_000
-MAX_NESTING = 100
 MAX_DEPTH = 200  # of a finished tree: later stages recurse over it
 MAX_EXPONENT = 64
-_CHAIN = 24  # longer sums and products become balanced trees
+LONG = 24  # longer sums and products become balanced trees
 
 _COMPARISONS = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge"}
-_ARITHMETIC = {"+": "add", "-": "sub", "*": "mul", "/": "div"}
+_ARITHMETIC = {"+": "add", "-": "sub", "*": "mul", "/": "div", "@": "matmul"}
 _OR, _AND, _NOT, _COMPARISON, _SUM, _PRODUCT, _UNARY, _POWER = range(1, 9)
 _LEVELS = {
     "or": _OR, "and": _AND, **dict.fromkeys(_COMPARISONS, _COMPARISON), "+": _SUM, "-": _SUM, "*": _PRODUCT,
-    "/": _PRODUCT, "**": _POWER,
+    "/": _PRODUCT, "@": _PRODUCT, "**": _POWER,
 }  # fmt: skip
 _INVERSE = {"add": "sub", "sub": "add", "mul": "div", "div": "mul"}
 _CONDITIONS = frozenset(("lt", "le", "gt", "ge", "and", "or", "not"))
-_OTHER_NAMES = {
-    "ln": "log", "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2", "fabs": "abs",
-    "sgn": "sign", "fmin": "min", "fmax": "max", "if": "where", "select": "where", "interp": "table",
-}  # fmt: skip
-_OTHER_CALLS = {
-    "pow": "write `a**b`", "square": "write `a**2`", "sq": "write `a**2`", "log10": "write `log(a)/log(10)`",
-    "log2": "write `log(a)/log(2)`", "cbrt": "write `a**(1/3)`", "exp2": "write `2**a`",
-    "ceil": "write `-floor(-a)`", "radians": "write `a*pi/180`", "degrees": "write `a*180/pi`",
-}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What was parsed, and where its nodes stand in the text (by id)."""
+
+    tree: Tree
+    offsets: dict[int, int]
+
+
+def parse_source(text: str, condition: bool = False, free: bool = False) -> Source:
+    """An expression as it is written; `condition` where a comparison is asked for instead of a number.
+
+    free: a name may be that of a function, where components of sensors stand.
+    """
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(0, f"the expression is longer than {MAX_LENGTH} characters", "split it with `let`")
+    parser = _Parser(tokenize(text), free)
+    tree = parser.whole(condition)
+    if depth(tree) > MAX_DEPTH:
+        raise ExpressionError(0, "the expression is nested too deeply", "split it with `let`")
+    return Source(tree, parser.offsets)
 
 
 def parse(text: str, condition: bool = False) -> Tree:
-    """The tree of an expression; `condition` where a comparison is asked for instead of a number."""
-    if len(text) > MAX_LENGTH:
-        raise ExpressionError(0, f"the expression is longer than {MAX_LENGTH} characters", "split it with `let`")
-    tree = _Parser(tokenize(text)).whole(condition)
-    if _depth(tree) > MAX_DEPTH:
-        raise ExpressionError(0, "the expression is nested too deeply", "split it with `let`")
-    return tree
+    """The tree of an expression of numbers alone."""
+    source = parse_source(text, condition)
+
+    def plain(tree: Tree) -> Tree:
+        if not isinstance(tree, Call):
+            return tree
+        args = tuple(map(plain, tree.args))
+        if tree.op.startswith("chain "):
+            return balanced(list(zip(["", *tree.op.split()[1:]], args, strict=True)))
+        if tree.op not in OPERATORS and tree.op not in FUNCTIONS:
+            raise ExpressionError(source.offsets[id(tree)], "a vector is no number", "write its parts")
+        return replace(tree, args=args)
+
+    return plain(source.tree)
 
 
 def is_condition(tree: Tree) -> bool:
     return isinstance(tree, Call) and tree.op in _CONDITIONS
 
 
-class _Parser:
-    def __init__(self, tokens: list[Token]) -> None:
-        self.tokens = tokens
-        self.next = 0
-        self.nodes = 0
-        self.nesting = 0
-
-    @property
-    def token(self) -> Token:
-        return self.tokens[self.next]
-
-    def take(self) -> Token:
-        token = self.tokens[self.next]
-        self.next += 1
-        return token
-
-    def at(self, *words: str) -> bool:
-        return self.token.kind in ("op", "name") and self.token.text in words
-
-    def made(self, tree: Tree, offset: int) -> Tree:
-        self.nodes += 1
-        if self.nodes > MAX_NODES:
-            hint = "split it with `let`"
-            raise ExpressionError(offset, f"the expression has more than {MAX_NODES} nodes", hint)
-        return tree
-
-    def enter(self, offset: int) -> None:
-        self.nesting += 1
-        if self.nesting > MAX_NESTING:
-            hint = "split it with `let`"
-            raise ExpressionError(offset, f"the expression is nested deeper than {MAX_NESTING}", hint)
-
+class _Parser(Calls):
     def whole(self, condition: bool) -> Tree:
         if self.token.kind == "end":
             raise ExpressionError(0, "the expression is empty", "write a number or an expression")
@@ -101,20 +95,6 @@ class _Parser:
             hint = "write `where(condition, a, b)`"
             raise ExpressionError(start, "a condition is not a number", hint)
         return tree
-
-    def unexpected(self, token: Token) -> ExpressionError:
-        if token.kind == "end":
-            return ExpressionError(token.offset, "the expression ends too early")
-        if token.text == ")":
-            return ExpressionError(token.offset, "`)` has no matching `(`")
-        if token.text == "[":
-            return ExpressionError(token.offset, "`[` stands only in `table(x, [...], [...])`")
-        if token.kind in ("name", "number") or token.text == "(":
-            hint = "there are no conditional expressions; write `where(condition, a, b)`"
-            if token.text in ("if", "else", "for", "lambda", "in", "is"):
-                return ExpressionError(token.offset, f"`{token.text}` is not allowed", hint)
-            return ExpressionError(token.offset, f"an operator is missing before {short(token.text)}")
-        return ExpressionError(token.offset, f"unexpected `{token.text}`")
 
     def expression(self, level: int) -> Tree:
         """All that binds at least as tightly as a level. One frame per nesting: the stack stays shallow."""
@@ -143,8 +123,12 @@ class _Parser:
             tree = self.made(Call("not", (operand,)), token.offset)
         elif token.kind == "name" and token.text not in ("and", "or", "not"):
             tree = self.call(token) if self.at("(") else self.name(token)
+        elif token.text == "[":
+            tree = self.listed(token)
         else:
             raise self.unexpected(token)
+        if self.at(".", "["):
+            tree = self.parts(tree)
         while (binding := _LEVELS.get(self.token.text, -1)) >= level:
             tree = self.chain(tree, binding) if binding in (_SUM, _PRODUCT) else self.infix(tree, binding)
         return tree
@@ -175,13 +159,21 @@ class _Parser:
 
     def chain(self, first: Tree, level: int) -> Tree:
         """`+ -`, or `* /`, from the left to the right."""
-        terms: list[tuple[str, Tree]] = [("", first)]
+        terms: list[tuple[str, Tree, int]] = [("", first, 0)]
         while _LEVELS.get(self.token.text) == level:
             token = self.take()
             right = self.expression(level + 1)
             self.numbers(token, first, right)
-            terms.append((_ARITHMETIC[token.text], self.made(right, token.offset)))  # counts the operator
-        return _chain(terms)
+            terms.append((_ARITHMETIC[token.text], right, token.offset))
+        if len(terms) > LONG:
+            made = Call(" ".join(["chain", *(op for op, _, _ in terms[1:])]), tuple(term for _, term, _ in terms))
+            for _, _, offset in terms[1:]:  # each operator counts
+                self.made(made, offset)
+            return made
+        tree = first
+        for op, term, offset in terms[1:]:
+            tree = self.made(Call(op, (tree, term)), offset)
+        return tree
 
     def numbers(self, token: Token, *operands: Tree) -> None:
         if any(is_condition(operand) for operand in operands):
@@ -195,87 +187,10 @@ class _Parser:
             text = f"an integer exponent may be at most {MAX_EXPONENT} in size"
             raise ExpressionError(start, text, "use a smaller one")
 
-    def unclosed(self, opening: Token) -> None:
-        if self.token.kind == "end":
-            raise ExpressionError(opening.offset, f"`{opening.text}` is not closed", "close it")
-        raise self.unexpected(self.token)
 
-    def name(self, token: Token) -> Tree:
-        if token.text in FUNCTIONS:
-            hint = f"write `{token.text}(...)`"
-            raise ExpressionError(token.offset, f"the function `{token.text}` has no arguments", hint)
-        return self.made(Name(token.text), token.offset)
-
-    def call(self, token: Token) -> Tree:
-        name = token.text
-        if name not in FUNCTIONS:
-            hint = _OTHER_CALLS.get(name) or (
-                f"did you mean `{_OTHER_NAMES[name]}`?" if name in _OTHER_NAMES else did_you_mean(name, FUNCTIONS)
-            )
-            raise ExpressionError(token.offset, f"there is no function {short(name)}", hint)
-        opening = self.take()
-        self.enter(token.offset)
-        arguments = self.table(token) if name == "table" else self.arguments(name, opening)
-        self.nesting -= 1
-        wanted = FUNCTIONS[name]
-        if wanted is not None and len(arguments) != wanted:
-            hint = "write `atan2(y, x)`" if name == "atan" else ""
-            if name in ("min", "max", "hypot") and len(arguments) > 2:
-                hint = f"nest them: `{name}(a, {name}(b, c))`"
-            text = f"`{name}` takes {wanted} argument{'s' if wanted > 1 else ''}, not {len(arguments)}"
-            raise ExpressionError(token.offset, text, hint)
-        return self.made(Call(name, tuple(arguments)), token.offset)
-
-    def arguments(self, name: str, opening: Token) -> list[Tree]:
-        found: list[Tree] = []
-        while not (self.at(")") and not found):
-            start = self.token.offset
-            found.append(self.wanted(name == "where" and not found, start))
-            if self.at(","):
-                self.take()
-                continue
-            if self.at(")"):
-                break
-            self.unclosed(opening)
-        self.take()
-        return found
-
-    def table(self, token: Token) -> list[Tree]:
-        """x, [x1, ...], [y1, ...]: flat, as Call stores it."""
-        found = [self.wanted(False, self.token.offset)]
-        lengths: list[int] = []
-        for _ in range(2):
-            if not self.at(","):
-                break
-            self.take()
-            if not self.at("["):
-                raise ExpressionError(self.token.offset, "`table` wants a list here", "write `[0, 1, 2]`")
-            opening = self.take()
-            before = len(found)
-            while True:
-                found.append(self.wanted(False, self.token.offset))
-                if self.at("]"):
-                    break
-                if not self.at(","):
-                    self.unclosed(opening)
-                self.take()
-            self.take()
-            lengths.append(len(found) - before)
-        if len(lengths) != 2 or not self.at(")"):
-            hint = "write `table(x, [x1, x2], [y1, y2])`"
-            raise ExpressionError(token.offset, "`table` takes a value and two lists", hint)
-        self.take()
-        if lengths[0] != lengths[1]:
-            text = f"the lists of `table` have {lengths[0]} and {lengths[1]} entries"
-            raise ExpressionError(token.offset, text, "make them equally long")
-        if lengths[0] < 2:
-            raise ExpressionError(token.offset, "`table` needs at least two points")
-        return found
-
-
-def _chain(terms: list[tuple[str, Tree]]) -> Tree:
-    """a + b - c ...: from the left, as in Python; a long chain as a balanced, shallow tree."""
-    if len(terms) <= _CHAIN:
+def balanced(terms: list[tuple[str, Tree]]) -> Tree:
+    """a + b - c ...: from the left, as in Python; a long chain as a balanced, shallow tree. The first op is empty."""
+    if len(terms) <= LONG:
         tree = terms[0][1]
         for op, term in terms[1:]:
             tree = Call(op, (tree, term))
@@ -285,12 +200,12 @@ def _chain(terms: list[tuple[str, Tree]]) -> Tree:
     right = [("", terms[middle][1]), *terms[middle + 1 :]]
     if op in ("sub", "div"):
         right = [right[0], *((_INVERSE[o], term) for o, term in right[1:])]
-    return Call(op, (_chain(terms[:middle]), _chain(right)))
+    return Call(op, (balanced(terms[:middle]), balanced(right)))
 
 
-def _depth(tree: Tree) -> int:
-    depth, level = 0, [tree]
+def depth(tree: Tree) -> int:
+    found, level = 0, [tree]
     while level:
-        depth += 1
+        found += 1
         level = [a for node in level if isinstance(node, Call) for a in node.args]
-    return depth
+    return found

@@ -14,9 +14,11 @@ _MAX_DIGITS = 1_000
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
-    r"|(?P<op>\*\*|<=|>=|==|!=|//|[-+*/()\[\],<>])",
+    r"|(?P<op>\*\*|<=|>=|==|!=|//|[-+*/@()\[\],<>])",
     re.ASCII,
 )
+
+_PART = re.compile(r"\.([A-Za-z0-9_]+)(?![A-Za-z0-9_(])", re.ASCII)  # not what is called
 
 
 class ExpressionError(Exception):
@@ -29,7 +31,7 @@ class ExpressionError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    kind: str  # number, name, op, end
+    kind: str  # number, name, op, part (after a dot), end
     text: str
     offset: int
 
@@ -46,6 +48,10 @@ def tokenize(text: str) -> list[Token]:
         if text[i] in " \t\r\n":
             i += 1
             continue
+        if (part := _PART.match(text, i)) and _has_parts(tokens, text[i - 1]):
+            tokens += [Token("op", ".", i), Token("part", part.group(1), i + 1)]
+            i = part.end()
+            continue
         match = _TOKEN.match(text, i)
         if match is None:
             raise _bad_character(text, i)
@@ -61,6 +67,11 @@ def tokenize(text: str) -> list[Token]:
         i = match.end()
     tokens.append(Token("end", "", len(text)))
     return tokens
+
+
+def _has_parts(tokens: list[Token], before: str) -> bool:
+    """Whether a dot is that of a part: v.x, (a + b).x, q[0].x."""
+    return bool(tokens) and tokens[-1].text[-1] == before and (tokens[-1].kind == "name" or before in ")]")
 
 
 def _bad_character(text: str, i: int) -> ExpressionError:

@@ -15,8 +15,9 @@ def mode_specs(spec: Spec) -> list[Spec]:
         replace(
             spec,
             imm=None,
-            initialize=None,
+            initialize=(),
             states=mode.states,
+            rotations=mode.rotations,
             covariances=mode.covariances,
             P0=mode.P0,
             noise=mode.noise,

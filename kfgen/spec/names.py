@@ -61,6 +61,8 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
     yield f"{upper}_H_INCLUDED", "the header guard", own
     functions = ["init", "predict", "set_state", "set_covariance", "get_covariance"]
     types = ["t", "real_t", "status_t"] + ["inputs_t"] * bool(spec.inputs) + ["parameters_t"] * bool(spec.parameters)
+    types += ["outputs_t"] * bool(spec.outputs)
+    functions += ["get_outputs"] * bool(spec.outputs)
     filters = [m.filter for m in spec.imm.modes] if spec.imm else [spec.filter]
     if any(f.covariance == "sqrt" for f in filters):
         functions += ["set_sqrt_covariance", "get_sqrt_covariance"]
@@ -114,10 +116,11 @@ def _scaled(spec: Spec, upper: str) -> Iterator[tuple[str, str, Place]]:
     values += [(i.name, f"the input `{i.name}`", spec.place) for i in spec.inputs]
     values += [(p.name, f"the parameter `{p.name}`", spec.place) for p in spec.parameters]
     values += [
-        (f"{s.name}_{c.name}", f"the component `{s.name}.{c.name}`", c.place)
+        (f"{s.name}_{c.name}", f"the {'component' if c in s.components else 'input'} `{s.name}.{c.name}`", c.place)
         for s in spec.measurements
-        for c in s.components
+        for c in s.fields
     ]
+    values += [(o.name, f"the output `{o.name}`", o.place) for o in spec.outputs]
     if spec.dt is not None and spec.dt.run_time:
         values.append(("dt", "dt", spec.place))
     for name, what, place in values:

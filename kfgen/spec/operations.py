@@ -198,6 +198,46 @@ def _table(x: Value, *points: Value) -> Value:
     return ys[-1]
 
 
+def _entry(i: Value, j: Value, w: Value, x: Value, y: Value, z: Value) -> Value:
+    """R(q)_ij, with |q| = 1 used as it always is: 1 - 2 (y^2 + z^2), 2 (x y - w z), ..."""
+    add, sub, mul = (_APPLY[op] for op in ("add", "sub", "mul"))
+    row, column, v = int(i), int(j), (x, y, z)
+    if row == column:
+        others = [mul(p, p) for k, p in enumerate(v) if k != row]
+        return sub(Fraction(1), mul(Fraction(2), add(*others)))
+    crossed = mul(w, v[3 - row - column])
+    combine = add if (column - row) % 3 == 2 else sub
+    return mul(Fraction(2), combine(mul(v[row], v[column]), crossed))
+
+
+def _rotation_vector(k: Value, w: Value, x: Value, y: Value, z: Value) -> Value:
+    """2 atan2(|v|, |w|) v / |v|, of q and -q the same: at most pi."""
+    v = (x, y, z)
+    length = _sqrt(_sum_of_squares(v))
+    sign = -1 if w < 0 else 1
+    if length == 0:
+        return Fraction(0)
+    return real(v[int(k)]) * sign * 2 * mpmath.atan2(real(length), abs(real(w))) / real(length)
+
+
+def _from_rotation_vector(k: Value, x: Value, y: Value, z: Value) -> Value:
+    """(cos |d|/2, d sin(|d|/2) / |d|)."""
+    v = (x, y, z)
+    length = _sqrt(_sum_of_squares(v))
+    if length == 0:
+        return Fraction(int(k == 0))
+    half = real(length) / 2
+    return mpmath.cos(half) if k == 0 else real(v[int(k) - 1]) * mpmath.sin(half) / real(length)
+
+
+def _sum_of_squares(v: tuple[Value, ...]) -> Value:
+    add, mul = _APPLY["add"], _APPLY["mul"]
+    total: Value = Fraction(0)
+    for part in v:
+        total = add(total, mul(part, part))
+    return total
+
+
 _APPLY: dict[str, Callable[..., Value]] = {
     "add": _arithmetic(lambda a, b: a + b),
     "sub": _arithmetic(lambda a, b: a - b),
@@ -225,4 +265,7 @@ _APPLY: dict[str, Callable[..., Value]] = {
     "hypot": _hypot,
     "floor": lambda a: Fraction(int(mpmath.floor(a))) if not is_exact(a) else Fraction(a.__floor__()),
     "table": _table,
+    "rotation": _entry,
+    "rotation_vector": _rotation_vector,
+    "from_rotation_vector": _from_rotation_vector,
 }

@@ -28,9 +28,21 @@ class Word:
 class Written:
     """A formula as it stands in the file: what may stand in it, and under which keys it is."""
 
-    expression: Expression
+    expression: Expression  # as it was parsed; of a vector or a list every entry
     scope: str
     path: Path
+    parts: tuple[Expression, ...] = ()  # of numbers, once the shapes are known
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A list of YAML where a formula stands: a vector, or the rows of a matrix."""
+
+    items: tuple[Expression | Listed, ...]
+    place: Place
+
+
+Formulas = Expression | Listed
 
 
 @dataclass

@@ -9,22 +9,20 @@ from __future__ import annotations
 from kfgen.scalar_names import DOUBLE, FLOAT, RULE
 from kfgen.spec.schema_filter import CODE, FILTER, FIXED
 from kfgen.spec.schema_model import (
-    COMPONENT,
-    CONSTANT,
     COVARIANCES,
     DYNAMICS,
-    GATE,
     INITIALIZE,
     INPUT,
     MODE_STATE,
     NOISE,
+    OUTPUT,
     PARAMETER,
-    SENSOR,
     SENSOR_NOISE,
     STATE,
     STEP,
-    matrix,
 )
+from kfgen.spec.schema_sensor import COMPONENT, GATE, SENSOR
+from kfgen.spec.schema_values import CONSTANT, VALUE, matrix
 from kfgen.spec.shapes import Choice, Either, Formula, Items, Key, Record, Table, Text, Whole
 
 ADVICE = {
@@ -45,7 +43,7 @@ ADVICE = {
 }
 """The names of all advice, and where it is given."""
 
-LET = Table("definition", Formula("f"), declares=True)
+LET = Table("definition", Formula("f", shaped=True), declares=True)
 MEASUREMENTS = Table("sensor", SENSOR, declares=True)
 NOISES = Table("noise", NOISE, declares=True)
 PER_MODE: tuple[Key, ...] = (
@@ -115,7 +113,7 @@ TOP = Record(
         Key("scalar", Text(), f"`{FLOAT}`, `{DOUBLE}` or `q<m>.<n>` with {RULE}.", FLOAT),
         Key(
             "constants",
-            Table("constant", CONSTANT, declares=True),
+            Table("constant", VALUE, declares=True),
             "Compile-time values; each may use constants above it.",
         ),
         Key(
@@ -130,7 +128,12 @@ TOP = Record(
         ),
         Key("states", Table("state", STATE, declares=True), "The states, in the order of x.", required=True),
         *PER_MODE[:2],
-        Key("initialize", INITIALIZE, "States set by the first update of a sensor; P stays."),
+        Key(
+            "initialize",
+            Either(mapping=INITIALIZE, sequence=Items(INITIALIZE, "mappings {from: ..., states: ...}")),
+            "States set by the first update of a sensor; P stays, or `var`. A list: of several sensors, and all else "
+            "waits until each has come.",
+        ),
         Key(
             "inputs",
             Table("input", INPUT, declares=True),
@@ -139,6 +142,11 @@ TOP = Record(
         *PER_MODE[2:],
         Key("dynamics", DYNAMICS, "The process model."),
         Key("measurements", MEASUREMENTS, "The sensors, each with its own update function."),
+        Key(
+            "outputs",
+            Table("output", OUTPUT, declares=True),
+            "What firmware reads: values and their standard deviations, computed when they are asked for.",
+        ),
         Key("filter", FILTER, "What filter is built.", "an ekf with its defaults"),
         Key("fixed", FIXED, "Fixed-point choices; used with a q scalar only, allowed with any."),
         Key("code", CODE, "What the emitted code looks like, and what it may cost."),
@@ -154,7 +162,7 @@ TOP = Record(
 )
 
 RECORDS: tuple[Record, ...] = (
-    TOP, PARAMETER, STEP, STATE, INITIALIZE, INPUT, NOISE, DYNAMICS, SENSOR, COMPONENT, SENSOR_NOISE, GATE,
+    TOP, PARAMETER, STEP, STATE, INITIALIZE, INPUT, NOISE, OUTPUT, DYNAMICS, SENSOR, COMPONENT, SENSOR_NOISE, GATE,
     FILTER, FIXED, CODE, HISTORY, IMM, MODE,
 )  # fmt: skip
 

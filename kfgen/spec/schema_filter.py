@@ -101,7 +101,7 @@ ADAPTIVE = Record(
     ),
 )
 
-_BY_STATE: Shape = Either(scalar=_COMPILED, mapping=Table("state", _COMPILED))
+_BY_STATE: Shape = Either(scalar=_COMPILED, mapping=Table("error", Formula("compiled", shaped=True)))
 
 FILTER = Record(
     "filter",
@@ -220,7 +220,7 @@ FILTER = Record(
         ),
         Key(
             "consider",
-            Items(Reference("state"), "states"),
+            Items(Reference("error"), "states"),
             "States whose gain is held at zero but whose uncertainty counts (Schmidt); joseph only.",
             only=_types("kf", "ekf", "iekf", "ekf2", ukf="it needs the joseph form"),
         ),
@@ -232,7 +232,7 @@ FIXED = Record(
     (
         Key(
             "scale",
-            Either(scalar=Choice(("auto",)), mapping=Table("state", _CONSTANT)),
+            Either(scalar=Choice(("auto",)), mapping=Table("state", Formula(shaped=True))),
             "A power-of-two unit per state; `auto` derives units and binary points.",
             "auto",
         ),

@@ -1,8 +1,19 @@
-"""The language's records for states, inputs, noises, dynamics and sensors."""
+"""The language's records for states, inputs, noises, dynamics and outputs."""
 
 from __future__ import annotations
 
-from kfgen.spec.schema_filter import ADAPTIVE, ROBUSTNESS
+from kfgen.spec.schema_values import (
+    CONSTANT,
+    DOC,
+    KIND,
+    UNIT,
+    VALUE,
+    VECTOR,
+    matrix,
+    pair,
+    scaling,
+    spread,
+)
 from kfgen.spec.shapes import (
     Choice,
     Either,
@@ -14,59 +25,15 @@ from kfgen.spec.shapes import (
     Record,
     Reference,
     Table,
-    Text,
     Tuple,
     Whole,
 )
 
-CONSTANT, FOLDED = Formula(), Formula("folded")
-
-
-def matrix(scope: str) -> Items:
-    return Items(Items(Formula(scope), "numbers"), "rows")
-
-
-def pair(what: str) -> Items:
-    return Items(CONSTANT, what, 2)
-
-
-KIND = Either(
-    scalar=Choice(("real", "angle")),
-    mapping=Record(
-        "kind",
-        (
-            Key(
-                "periodic",
-                CONSTANT,
-                "The period P, greater than 0: the value lives in (-P/2, P/2].",
-                required=True,
-            ),
-        ),
-    ),
-)
-UNIT = Key("unit", Text(), "The physical unit, for documentation.")
-DOC = Key("doc", Text(), "A sentence for the documentation of the emitted code.")
-
-
-def scaling(of: str) -> Key:
-    return Key(
-        "range",
-        pair("[lowest, highest]"),
-        f"The values the {of} is expected to take: for scaling, not enforced.",
-    )
-
-
-def spread(scope: str, of: str) -> tuple[Key, ...]:
-    return (
-        Key("std", Formula(scope), f"The standard deviation of the {of}; exactly one of `std` and `var`."),
-        Key("var", Formula(scope), f"The variance of the {of}; exactly one of `std` and `var`."),
-    )
-
-
 PARAMETER = Record(
     "parameter",
     (
-        Key("value", CONSTANT, "The value after init.", required=True),
+        Key("value", VALUE, "The value after init.", required=True),
+        VECTOR,
         UNIT,
         scaling("parameter"),
         DOC,
@@ -88,14 +55,42 @@ STEP = Record(
     ),
 )
 
+_QUATERNION = Only("kind", ("quaternion",), "real", "a state of kind")
+
 STATE = Record(
     "state",
     (
-        Key("init", FOLDED, "The initial value.", required=True),
-        *spread("folded", "initial value"),
+        Key(
+            "init",
+            Formula("folded", shaped=True),
+            "The initial value; that of a quaternion is normalised.",
+            required=True,
+        ),
+        *spread("folded", "initial value (of a quaternion: of the rotation error, in rad)"),
+        VECTOR,
         UNIT,
         scaling("state"),
-        Key("kind", KIND, "`angle` lives in (-pi, pi]; `{periodic: P}` in (-P/2, P/2].", "real"),
+        Key(
+            "kind",
+            KIND,
+            "`angle` lives in (-pi, pi]; `{periodic: P}` in (-P/2, P/2]; `quaternion` is a rotation from body to "
+            "reference, four numbers w, x, y, z with an error of three.",
+            "real",
+        ),
+        Key(
+            "error",
+            Choice(("body", "reference")),
+            "The side of the rotation error d: `body` is q exp(d), `reference` exp(d) q.",
+            "body",
+            only=_QUATERNION,
+        ),
+        Key(
+            "reset",
+            Flag(),
+            "After an update P is turned to the new attitude; not with an iekf, in which this is inherent.",
+            "true",
+            only=_QUATERNION,
+        ),
         Key(
             "bounds",
             pair("[lowest, highest]"),
@@ -107,7 +102,9 @@ STATE = Record(
 MODE_STATE = Record("state", STATE.keys[:3])
 
 COVARIANCES = Items(
-    Tuple((Reference("state"), Reference("state"), FOLDED), "[state, state, covariance]"),
+    Tuple(
+        (Reference("error"), Reference("error"), Formula("folded", shaped=True)), "[state, state, covariance]"
+    ),
     "triples [state, state, covariance]",
 )
 
@@ -117,26 +114,45 @@ INITIALIZE = Record(
         Key("from", Reference("sensor"), "The sensor whose first update sets states.", required=True),
         Key(
             "states",
-            Table("state", Reference("component")),
-            "Which states are set, each from which component of that sensor.",
+            Table("state", Formula("initialize", shaped=True)),
+            "Which states are set, each to an expression in the components of that sensor.",
             required=True,
+        ),
+        Key(
+            "var",
+            Table("error", Formula("initialize", shaped=True)),
+            "Their variances from then on; those of others stay.",
         ),
     ),
 )
 
-INPUT = Record("input", (UNIT, scaling("input"), DOC))
+INPUT = Record("input", (VECTOR, UNIT, scaling("input"), DOC))
+
+OUTPUT = Record(
+    "output",
+    (
+        Key("value", Formula("output", shaped=True), "What is told, beside its standard deviation.", required=True),
+        UNIT,
+        DOC,
+    ),
+)
 
 NOISE = Record(
     "noise",
     (
         *spread("Q", "noise, per step"),
-        Key("density", Formula("Q"), "Power spectral density in unit^2/Hz; continuous form only."),
-        Key("root_density", Formula("Q"), "The root of the density, as in data sheets; continuous form only."),
+        VECTOR,
+        Key("density", Formula("Q", shaped=True), "Power spectral density in unit^2/Hz; continuous form only."),
+        Key(
+            "root_density",
+            Formula("Q", shaped=True),
+            "The root of the density, as in data sheets; continuous form only.",
+        ),
         UNIT,
         DOC,
     ),
 )
-SENSOR_NOISE = Record("noise", (*spread("R", "noise"), UNIT, DOC))
+SENSOR_NOISE = Record("noise", (*spread("R", "noise"), VECTOR, UNIT, DOC))
 
 _CONTINUOUS = Only("form", ("continuous",), "discrete", "dynamics of form")
 
@@ -147,10 +163,10 @@ DYNAMICS = Record(
             "form",
             Choice(("discrete", "continuous")),
             "`discrete`: f gives x[k+1], a state not listed stays as it is; `continuous`: f gives dx/dt, "
-            "a state not listed has 0.",
+            "a state not listed has 0. Of a quaternion f gives the new one, or the body's angular rate, a 3-vector.",
             "discrete",
         ),
-        Key("f", Table("state", Formula("f")), "The process model, one expression per state."),
+        Key("f", Table("state", Formula("f", shaped=True)), "The process model, one expression per state."),
         Key(
             "integrator",
             Choice(("euler", "midpoint", "rk4", "exact")),
@@ -161,75 +177,14 @@ DYNAMICS = Record(
         Key("substeps", Whole(1, 1000), "Integration steps per step.", "1", only=_CONTINUOUS),
         Key(
             "Q",
-            Either(mapping=Table("state", Formula("Q")), sequence=matrix("Q")),
-            "Additive process noise: variances per step by state (one not listed has 0), or the full matrix. "
-            "Evaluated at the prior state.",
+            Either(
+                scalar=Formula("Q", shaped=True),
+                mapping=Table("error", Formula("Q", shaped=True)),
+                sequence=matrix("Q").sequence,
+            ),
+            "Additive process noise: variances per step by state (one not listed has 0; of a vector a number, a vector "
+            "or a matrix), or the full matrix. Evaluated at the prior state.",
             "0",
         ),
-    ),
-)
-
-COMPONENT = Record(
-    "component",
-    (
-        Key("h", Formula("h"), "The expected measurement.", required=True),
-        *spread("R", "measurement noise"),
-        UNIT,
-        scaling("component"),
-        Key("kind", KIND, "`angle` and `{periodic: P}`: the residual is wrapped.", "real"),
-        Key("residual", Formula("residual"), "The residual as an expression in `z` and `h`.", "z - h"),
-        DOC,
-    ),
-)
-
-GATE = Record(
-    "gate",
-    (
-        Key(
-            "probability",
-            CONSTANT,
-            "The vector is rejected when its normalised innovation squared exceeds the chi-square quantile "
-            "of this probability, between 0 and 1; exactly one of `probability` and `threshold`.",
-        ),
-        Key(
-            "threshold",
-            Formula("gate"),
-            "What the normalised innovation squared may not exceed, whichever components are used; greater than 0.",
-        ),
-        Key(
-            "reset_after",
-            Whole(1, 1_000_000),
-            "After N rejections in a row the next vector is accepted (ANOMALY).",
-        ),
-    ),
-)
-
-SENSOR = Record(
-    "sensor",
-    (
-        Key("z", Table("component", COMPONENT, declares=True), "The components, in order.", required=True),
-        Key("R", matrix("R"), "The full noise covariance instead of the components' std or var."),
-        Key(
-            "noise",
-            Table("noise", SENSOR_NOISE, declares=True),
-            "Noise inputs that may stand in h (non-additive); their std and var may then be left out.",
-        ),
-        Key(
-            "noise_covariance",
-            matrix("R"),
-            "The full covariance of these noise inputs, instead of std or var.",
-        ),
-        Key("gate", GATE, "Rejection of outliers."),
-        Key("rate", CONSTANT, "Updates a prediction, greater than 0: what budgets roll first is called least.", "1"),
-        Key("robust", ROBUSTNESS, "In place of the filter's; `none`: off.", "the filter's"),
-        Key(
-            "adaptive",
-            Either(scalar=Flag(off="none"), mapping=ADAPTIVE),
-            "In place of the filter's; `none`: off.",
-            "the filter's",
-        ),
-        Key("adapt_R", Formula(words=("none",)), "In place of the filter's; `none`: off.", "the filter's"),
-        Key("partial", Flag(), "Also emit update_<sensor>_masked, for some of the components.", "false"),
-        DOC,
     ),
 )

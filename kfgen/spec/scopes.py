@@ -7,19 +7,20 @@ definitions of their own). A formula is checked in every context that uses it.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 
 from kfgen.errors import Place
+from kfgen.spec.contexts import Context
 from kfgen.spec.lexer import positions
 from kfgen.spec.names import wrong_name
 from kfgen.spec.problems import LIMIT, SHARED_STATES, did_you_mean, short, suggestion
 from kfgen.spec.raw import Path, Written
 from kfgen.spec.shapes import SCOPE_WORDS, SCOPES
-from kfgen.spec.tree import Expression, names
-from kfgen.spec.types import Definition, Sensor, Spec
+from kfgen.spec.tree import names
+from kfgen.spec.types import Spec
 from kfgen.spec.walk import Walker
 
 DECLARING = ("constants", "parameters", "states", "inputs", "noise", "let")
+DECLARED = ("constant", "parameter", "state", "rotation error", "input", "noise", "definition")
 REPLACEABLE = (
     "states",
     "covariances",
@@ -31,42 +32,6 @@ REPLACEABLE = (
     "measurements",
     "filter",
 )
-
-
-@dataclass
-class Context:
-    """The names of a spec, or of one of its modes."""
-
-    spec: Spec
-    let: tuple[Definition, ...]
-    sensors: tuple[Sensor, ...]
-    kinds: dict[str, str] = field(default_factory=dict)  # name -> its kind
-    closures: dict[str, frozenset[str]] = field(default_factory=dict)  # definition -> all that it rests on
-
-    def __post_init__(self) -> None:
-        for definition in self.let:  # in an order in which each uses only those before it
-            found: set[str] = set()
-            for name in names(definition.value.tree):
-                found |= self.closures.get(name, frozenset({name}))
-            self.closures[definition.name] = frozenset(found)
-
-    def uses(self, expression: Expression | None) -> frozenset[str]:
-        """The names a formula rests on, definitions resolved."""
-        if expression is None:
-            return frozenset()
-        found: set[str] = set()
-        for name in names(expression.tree):
-            found |= self.closures.get(name, frozenset({name}))
-        return frozenset(found)
-
-    def uses_kinds(self, expression: Expression | None) -> frozenset[str]:
-        """The kinds of the names a formula rests on; a fixed dt is a constant."""
-        fixed = self.spec.dt is not None and not self.spec.dt.run_time
-        special = {"dt": "constant" if fixed else "dt", "t": "t", "pi": "constant", "e": "constant"}
-        return frozenset(special.get(n) or self.kinds.get(n, "unknown") for n in self.uses(expression))
-
-    def sensor_noises(self, sensor: str) -> frozenset[str]:
-        return frozenset(n.name for s in self.sensors if s.name == sensor for n in s.noise)
 
 
 class Scopes:
@@ -87,11 +52,11 @@ class Scopes:
         modes = self.spec.imm.modes if self.spec.imm else ()
         taken: dict[str, dict[str, tuple[str, Place]]] = {"": {}, **{mode.name: {} for mode in modes}}
         for kind, name, place, path in self.walker.declared:
-            if (wrong := wrong_name(name, kind not in ("sensor", "component"))) is not None:
+            if (wrong := wrong_name(name, kind not in ("sensor", "component", "output"))) is not None:
                 self.problems.add(place, *wrong)
                 self.doubtful.update(re.findall(r"[A-Za-z_]\w*", name, re.ASCII))
-            if kind not in ("constant", "parameter", "state", "input", "noise", "definition"):
-                continue
+            if kind not in DECLARED or (kind == "input" and "measurements" in path):
+                continue  # the inputs of a sensor are known in its formulas alone
             if kind == "noise" and "measurements" in path:
                 kind = "sensor noise"
             for context in self._users(path, everywhere=True):
@@ -134,6 +99,9 @@ class Scopes:
 
     def _formula(self, written: Written, context: Context) -> None:
         allowed = SCOPES[written.scope]
+        if written.scope == "initialize":
+            self._starting(written, context, allowed)
+            return
         for name in dict.fromkeys(names(written.expression.tree)):
             if name == "e" and "innovation" in allowed:
                 continue
@@ -142,21 +110,54 @@ class Scopes:
             if name in ("dt", "t"):
                 self._time(written, name, allowed, name)
                 continue
-            kind = self._kind(name, written, context)
-            if kind is None:
-                self._unknown(written, name, context)
-            elif kind not in allowed:
-                self._not_here(written, name, f"the {kind} {short(name)}")
-            elif kind == "constant" and written.path[0] == "constants":
-                self._above(written, name)
-            elif kind == "definition":
-                self._definition(written, name, context, allowed)
+            self._name(written, name, context, allowed)
+
+    def _name(self, written: Written, name: str, context: Context, allowed: frozenset[str]) -> None:
+        kind = self._kind(name, written, context)
+        if kind is None:
+            self._unknown(written, name, context)
+        elif kind not in allowed:
+            self._not_here(written, name, f"the {kind} {short(name)}")
+        elif kind == "constant" and written.path[0] == "constants":
+            self._above(written, name)
+        elif kind == "definition":
+            self._definition(written, name, context, allowed)
+
+    def _starting(self, written: Written, context: Context, allowed: frozenset[str]) -> None:
+        """In `initialize` the components of the sensor hide all other names."""
+        sensor = self._started(written.path)
+        if sensor is None:
+            return  # which is a mistake of its own
+        components, own = context.component_names(sensor), context.sensor_names(sensor)
+        for name in dict.fromkeys(names(written.expression.tree)):
+            if name in components or own.get(name) == "sensor input" or name in ("pi", "e"):
+                continue
+            if name in ("dt", "t"):
+                self._time(written, name, allowed, name)
+            elif name in context.kinds and context.kinds[name] in allowed:
+                continue
+            elif name in context.kinds:
+                self._not_here(written, name, f"the {context.kinds[name]} {short(name)}")
+            elif name not in self.doubtful:
+                known = [*components, *(n for n, kind in own.items() if kind == "sensor input")]
+                near = did_you_mean(name, sorted(known), f"components of {sensor}")
+                self._say(written, name, f"there is no component of {sensor} {short(name)}", near)
+
+    def _started(self, path: Path) -> str | None:
+        """The sensor of the rule of `initialize` in which a formula stands."""
+        rules = self.spec.initialize
+        index = int(path[1].strip("[]")) if path[1].startswith("[") else 0
+        known = {s.name for s in self.spec.measurements}
+        return rules[index].sensor if index < len(rules) and rules[index].sensor in known else None
 
     def _kind(self, name: str, written: Written, context: Context) -> str | None:
         kind = context.kinds.get(name)
-        if kind == "sensor noise" and "sensor noise" in SCOPES[written.scope]:
+        if "measurements" in written.path:
             sensor = written.path[written.path.index("measurements") + 1]
-            if name not in context.sensor_noises(sensor):
+            own = context.sensor_names(sensor)
+            if own.get(name) == "sensor input":
+                return "sensor input"
+            if kind == "sensor noise" and "sensor noise" in SCOPES[written.scope] and name not in own:
                 return "noise of another sensor"
         return kind
 
@@ -245,22 +246,19 @@ class Scopes:
 
     def _references(self) -> None:
         states = [s.name for s in self.spec.states]
-        sensors = {s.name: [c.name for c in s.components] for s in self.spec.measurements}
-        initialize = self.spec.initialize
+        vectors = [g.name for g in self.spec.groups if g.parts[0] in states]
+        sensors = [s.name for s in self.spec.measurements]
+        of_kind = {
+            "state": [*states, *vectors],
+            "error": [*self.spec.errors, *vectors],
+            "sensor": sensors,
+            "function": ["predict", *(f"update_{sensor}" for sensor in sensors)],
+        }
         for reference, word, path in self.walker.references:
-            known: list[str] = []
-            of = reference.of
-            if of == "state":
-                known = states
-            elif of == "sensor":
-                known = list(sensors)
-            elif of == "function":
-                known = ["predict", *(f"update_{sensor}" for sensor in sensors)]
-            elif of == "component":
-                of = f"component of {initialize.sensor}" if initialize else of
-                known = sensors.get(initialize.sensor, []) if initialize else []
+            known = of_kind.get(reference.of, [])
+            of = "state" if reference.of == "error" else reference.of
             if known and word.text not in known and word.text not in self.doubtful:
-                hint = did_you_mean(word.text, known, f"{reference.of}s")
+                hint = did_you_mean(word.text, known, f"{of}s")
                 if path[:2] == ("imm", "modes") and "states" in path and not hint.startswith("did you mean"):
                     hint = SHARED_STATES
                 self.problems.add(word.place, f"there is no {of} {short(word.text)}", hint)

@@ -12,12 +12,18 @@ SCOPES: dict[str, frozenset[str]] = {
     "folded": frozenset({"constant", "fixed dt", "parameter"}),
     "f": frozenset({"constant", "parameter", "state", "input", "noise", "definition", "dt", "t"}),
     "Q": frozenset({"constant", "parameter", "state", "input", "definition", "dt", "t"}),
-    "h": frozenset({"constant", "parameter", "state", "input", "sensor noise", "definition", "fixed dt", "t"}),
-    "R": frozenset({"constant", "parameter", "state", "input", "definition", "fixed dt", "t"}),
-    "residual": frozenset({"constant", "parameter", "state", "input", "definition", "fixed dt", "t", "z", "h"}),
+    "h": frozenset(
+        {"constant", "parameter", "state", "input", "sensor input", "sensor noise", "definition", "fixed dt", "t"}
+    ),
+    "R": frozenset({"constant", "parameter", "state", "input", "sensor input", "definition", "fixed dt", "t"}),
+    "residual": frozenset(
+        {"constant", "parameter", "state", "input", "sensor input", "definition", "fixed dt", "t", "z", "h"}
+    ),
     "psi": frozenset({"constant", "parameter", "fixed dt", "innovation"}),
     "transition": frozenset({"constant", "parameter", "dt"}),
-    "gate": frozenset({"constant", "parameter", "input", "fixed dt"}),
+    "gate": frozenset({"constant", "parameter", "input", "sensor input", "fixed dt"}),
+    "initialize": frozenset({"component", "sensor input", "input", "constant", "parameter", "fixed dt"}),
+    "output": frozenset({"constant", "parameter", "state", "definition", "fixed dt", "t"}),
 }
 
 # The same in words, for messages and the reference.
@@ -27,12 +33,15 @@ SCOPE_WORDS: dict[str, str] = {
     "folded": "constants, a fixed dt and parameters (their spec values)",
     "f": "constants, parameters, states, inputs, noises, definitions, dt and t",
     "Q": "constants, parameters, states, inputs, definitions, dt and t",
-    "h": "constants, parameters, states, inputs, the sensor's own noises, definitions, t and a fixed dt",
-    "R": "constants, parameters, states, inputs, definitions, t and a fixed dt",
-    "residual": "z, h, constants, parameters, states, inputs, definitions, t and a fixed dt",
+    "h": "constants, parameters, states, inputs, the sensor's own inputs and noises, definitions, t and a fixed dt",
+    "R": "constants, parameters, states, inputs, the sensor's own inputs, definitions, t and a fixed dt",
+    "residual": "z, h, constants, parameters, states, inputs, the sensor's own inputs, definitions, t and a fixed dt",
     "psi": "e (the normalised innovation), constants, parameters and a fixed dt",
     "transition": "constants, parameters and dt",
-    "gate": "constants, parameters, inputs and a fixed dt",
+    "gate": "constants, parameters, inputs, the sensor's own inputs and a fixed dt",
+    "initialize": "the sensor's components (which hide other names) and inputs, inputs, constants, parameters and a "
+    "fixed dt",
+    "output": "constants, parameters, states, definitions of these, t and a fixed dt",
 }
 
 
@@ -57,11 +66,15 @@ class Flag:
 
 @dataclass(frozen=True)
 class Formula:
-    """A number or an expression. `words` may stand instead of it; `condition` wants a comparison."""
+    """A number or an expression. `words` may stand instead of it; `condition` wants a comparison.
+
+    shaped: it may be a vector or a matrix, written as an expression or as a list.
+    """
 
     scope: str = "constant"
     condition: bool = False
     words: tuple[str, ...] = ()
+    shaped: bool = False
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,21 @@ substitutes `Spec.constants` exactly.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from kfgen.errors import NOWHERE, Place
 from kfgen.scalar_names import FLOAT
+from kfgen.spec.options import Adaptive as Adaptive
+from kfgen.spec.options import Code as Code
+from kfgen.spec.options import Filter as Filter
+from kfgen.spec.options import Fixed as Fixed
+from kfgen.spec.options import Matrix as Matrix
+from kfgen.spec.options import Robust as Robust
+from kfgen.spec.options import SigmaPoints as SigmaPoints
 from kfgen.spec.tree import Expression
 
-Matrix = tuple[tuple[Expression, ...], ...]
 Range = tuple[Expression, Expression]  # constant expressions
 
 
@@ -59,7 +65,7 @@ class State:
     variance: Expression | None  # None where P0 is given
     unit: str = ""
     range: Range | None = None
-    kind: str = "real"  # real | angle | periodic
+    kind: str = "real"  # real | angle | periodic | quaternion (a part of one: Spec.rotations)
     period: Expression | None = None  # angle: 2*pi; periodic: as written; real: None
     bounds: Range | None = None
     doc: str = ""
@@ -88,6 +94,44 @@ class Noise:
 
 
 @dataclass(frozen=True)
+class Group:
+    """A vector: consecutive scalars of one table (states, inputs, noises, ...) under one name of the spec."""
+
+    name: str
+    parts: tuple[str, ...]
+    place: Place = NOWHERE
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A unit quaternion among the states (Hamilton, scalar first) or the components of a sensor, and its error.
+
+    parts: its four numbers w, x, y, z, which are states (components) of kind "quaternion"; errors: the three parts of
+    its rotation error, in rad. error: body (q [+] d = q exp(d)) or reference (exp(d) q). variances of the errors: None
+    where P0 or R is given whole.
+    """
+
+    name: str
+    parts: tuple[str, str, str, str]
+    errors: tuple[str, str, str]
+    error: str = "body"  # body | reference
+    reset: bool = True
+    variances: tuple[Expression | None, Expression | None, Expression | None] = (None, None, None)
+    place: Place = NOWHERE
+
+
+@dataclass(frozen=True)
+class Output:
+    """What firmware reads: a value and its standard deviation."""
+
+    name: str
+    value: Expression
+    unit: str = ""
+    doc: str = ""
+    place: Place = NOWHERE
+
+
+@dataclass(frozen=True)
 class Covariance:
     first: str
     second: str
@@ -96,8 +140,18 @@ class Covariance:
 
 @dataclass(frozen=True)
 class Initialize:
+    """The first update of a sensor sets states (parts of vectors, by name) and, where given, variances of errors.
+
+    The expressions are in the names of the sensor's components, which hide others, its inputs, inputs, constants and
+    parameters.
+    """
+
     sensor: str
-    states: Mapping[str, str]  # state -> component of the sensor
+    states: Mapping[str, Expression]
+    variance: Mapping[str, Expression] = field(default_factory=dict)
+    let: tuple[Definition, ...] = ()  # what the expressions share, each using only those before it
+    place: Place = NOWHERE
+    waits: bool = False  # one of a list: predictions and all else wait until every named sensor has come
 
 
 @dataclass(frozen=True)
@@ -144,82 +198,21 @@ class Sensor:
     partial: bool = False
     rate: Expression | None = None  # calls a prediction; None: 1
     own: Mapping[str, Any] = field(default_factory=dict)  # robust, adaptive, adapt_R where they are not the filter's
+    inputs: tuple[Input, ...] = ()  # known values that come with this measurement
+    groups: tuple[Group, ...] = ()  # its vectors: components and inputs
+    rotations: tuple[Rotation, ...] = ()  # components that are quaternions
     doc: str = ""
     place: Place = NOWHERE
 
+    @property
+    def fields(self) -> tuple[Component | Input, ...]:
+        """All numbers of a measurement, in the order of the sensor's struct: its components, then its inputs."""
+        return (*self.components, *self.inputs)
 
-@dataclass(frozen=True)
-class SigmaPoints:
-    kind: str = "merwe"  # merwe | julier | wiki | trivial | cubature | custom
-    alpha: Expression | None = None
-    beta: Expression | None = None
-    kappa: Expression | None = None
-    redraw: bool = True
-    points: Matrix | None = None
-    wm: tuple[Expression, ...] | None = None
-    wc: tuple[Expression, ...] | None = None
-
-
-@dataclass(frozen=True)
-class Robust:
-    influence: str  # chernodarov | huber | custom
-    k: Expression | None = None
-    psi: Expression | None = None
-    psi_dot: Expression | None = None
-
-
-@dataclass(frozen=True)
-class Adaptive:
-    """Exactly one of the two is given where the spec gives one; both None: the documented default."""
-
-    probability: Expression | None = None
-    chi2: Expression | None = None
-
-
-@dataclass(frozen=True)
-class Filter:
-    type: str = "ekf"  # kf | ekf | iekf | ekf2 | ukf
-    covariance: str = "ud"  # ud | full | sqrt
-    update: str | None = None  # bierman | joseph | standard; the default is filled in; None for ukf and sqrt
-    iterations: int | None = None
-    gain: str | None = None  # steady
-    sequential: bool = False
-    sigma_points: SigmaPoints | None = None
-    augment: bool = False
-    reject: Expression | str | None = None  # an expression, or "non_finite"
-    robust: Robust | None = None
-    adaptive: Adaptive | None = None
-    adapt_R: Expression | None = None
-    adapt_Q: Expression | None = None
-    variance_floor: Mapping[str, Expression] = field(default_factory=dict)  # a single number is spread over the states
-    variance_ceiling: Mapping[str, Expression] = field(default_factory=dict)
-    innovation_floor: Expression | None = None
-    gain_limit: Expression | None = None
-    consider: tuple[str, ...] = ()
-    place: Place = NOWHERE
-    places: Mapping[str, Place] = field(default_factory=dict)  # of the keys that were written
-
-
-@dataclass(frozen=True)
-class Fixed:
-    scale: Mapping[str, Expression] | None = None  # None: auto
-    rounding: str = "nearest"
-    overflow: str = "saturate"
-    log: str | None = None  # a path, relative to the spec
-    log_place: Place = NOWHERE
-
-
-@dataclass(frozen=True)
-class Code:
-    unroll: str = "auto"
-    unroll_by: Mapping[str, str] = field(default_factory=dict)  # function -> full | none | auto, in place of `unroll`
-    flash: int | None = None
-    ram: int | None = None
-    stack: int | None = None
-    log_likelihood: bool = False
-    gate_count: bool = False
-    compensated: tuple[str, ...] = ()  # states
-    places: Mapping[str, Place] = field(default_factory=dict)
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """The coordinates of the innovation, in order: R is of this size."""
+        return error_names((component.name for component in self.components), self.rotations)
 
 
 @dataclass(frozen=True)
@@ -248,6 +241,7 @@ class Mode:
     measurements: tuple[Sensor, ...]
     filter: Filter
     place: Place = NOWHERE
+    rotations: tuple[Rotation, ...] = ()  # the spec's, with this mode's variances
 
 
 @dataclass(frozen=True)
@@ -272,18 +266,33 @@ class Spec:
     states: tuple[State, ...] = ()
     covariances: tuple[Covariance, ...] = ()
     P0: Matrix | None = None
-    initialize: Initialize | None = None
+    initialize: tuple[Initialize, ...] = ()
     inputs: tuple[Input, ...] = ()
     noise: tuple[Noise, ...] = ()
     noise_covariance: Matrix | None = None
     let: tuple[Definition, ...] = ()  # in an order in which each uses only those before it
     dynamics: Dynamics = Dynamics()
     measurements: tuple[Sensor, ...] = ()
-    filter: Filter = Filter()
-    fixed: Fixed = Fixed()
-    code: Code = Code()
+    filter: Filter = field(default_factory=Filter)
+    fixed: Fixed = field(default_factory=Fixed)
+    code: Code = field(default_factory=Code)
     imm: Imm | None = None
     history: History | None = None
+    groups: tuple[Group, ...] = ()  # vectors and matrices (by rows) of constants, parameters, states, inputs, noises
+    rotations: tuple[Rotation, ...] = ()  # states that are quaternions, in order
+    outputs: tuple[Output, ...] = ()
     advice: tuple[str, ...] = ()  # names of the advice that is not wanted
     place: Place = NOWHERE
     places: Mapping[str, Place] = field(default_factory=dict)  # of the top-level keys that were written
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """The coordinates of the error, in order (NE): a number's own name, three of a rotation for its four parts."""
+        return error_names((state.name for state in self.states), self.rotations)
+
+
+def error_names(names: Iterable[str], rotations: tuple[Rotation, ...]) -> tuple[str, ...]:
+    """The coordinates of the error of states or components: a quaternion's three in the place of its four parts."""
+    first = {rotation.parts[0]: rotation.errors for rotation in rotations}
+    others = {part for rotation in rotations for part in rotation.parts[1:]}
+    return tuple(e for name in names if name not in others for e in first.get(name, (name,)))

@@ -9,12 +9,13 @@ import re
 from typing import Any
 
 from kfgen.errors import Place
-from kfgen.spec.expressions import parse
+from kfgen.spec.expressions import parse_source
+from kfgen.spec.findings import Findings
 from kfgen.spec.hints import meant_key, missing_key_hint, unknown_key_hint, wanted_words
 from kfgen.spec.lexer import ExpressionError
-from kfgen.spec.nodes import Bad, Mapping, Node, Scalar, Sequence, kind_of
-from kfgen.spec.problems import Problems, did_you_mean, short, unseen
-from kfgen.spec.raw import BAD, Fields, Path, Word, Written, path_text
+from kfgen.spec.nodes import Bad, Mapping, Node, Scalar, Sequence
+from kfgen.spec.problems import did_you_mean, short
+from kfgen.spec.raw import BAD, Fields, Formulas, Listed, Path, Word, Written, path_text
 from kfgen.spec.shapes import (
     Budget,
     Choice,
@@ -35,38 +36,8 @@ from kfgen.spec.tree import Expression, Name
 _BUDGET = re.compile(r"(\d+)\s*([kK])\Z", re.ASCII)
 
 
-class Walker:
-    """Walks nodes by shapes, and remembers every formula and where every value stands."""
-
-    def __init__(self, problems: Problems) -> None:
-        self.problems = problems
-        self.formulas: list[Written] = []
-        self.whole: list[tuple[Expression, Whole]] = []
-        self.sources: dict[Place, Scalar] = {}
-        self.values: dict[str, Place] = {}  # key path -> place of the value
-        self.keys: dict[str, Place] = {}  # key path -> place of the key
-        self.declared: list[tuple[str, str, Place, Path]] = []  # kind, name, place, path
-        self.empty: set[str] = set()  # paths of collections without entries
-        self.broken: set[str] = set()  # paths of values that could not be read
-        self.meant: set[str] = set()  # paths of keys for which an unknown key was probably meant
-        self.doubtful: set[str] = set()  # names that a reported mistake may have hidden
-        self.references: list[tuple[Reference, Word, Path]] = []
-
-    # --- places
-
-    def place(self, node: Node, path: Path) -> Place:
-        return self.problems.at(node.line, node.column, path_text(path))
-
-    def offset_place(self, expression: Expression, offset: int) -> Place:
-        """The place of a character of an expression."""
-        source = self.sources.get(expression.place)
-        if source is None:
-            return expression.place
-        line, column = source.position(offset)
-        return Place(self.problems.file, line, column, expression.place.path)
-
-    def value_place(self, path: str, otherwise: Place) -> Place:
-        return self.values.get(path, otherwise)
+class Walker(Findings):
+    """Walks nodes by shapes."""
 
     # --- values
 
@@ -85,6 +56,8 @@ class Walker:
         if isinstance(shape, Record):
             return self.record(node, shape, path)
         if isinstance(shape, Formula | Whole):
+            if isinstance(shape, Formula) and shape.shaped and isinstance(node, Sequence):
+                return self.listed(node, shape, path)
             return self.formula(node, shape, path)
         if isinstance(node, Bad):
             return None
@@ -95,15 +68,6 @@ class Walker:
         if isinstance(shape, Items | Tuple):
             return self.items(node, shape, path)
         return self.scalar(node, shape, path)
-
-    def wrong(self, node: Node, path: Path, wanted: str, hint: str = "") -> None:
-        if isinstance(node, Scalar) and node.kind == "null":
-            self.problems.add(self.place(node, path), "there is no value", hint or f"write {wanted}")
-            return
-        found = kind_of(node)
-        if isinstance(node, Scalar) and len(node.text) <= 40 and node.kind != "boolean":
-            found += f" (`{node.text}`)"
-        self.problems.add(self.place(node, path), f"{wanted} is wanted here, not {found}", hint)
 
     def either(self, node: Node, shape: Either, path: Path) -> Any:
         by_kind = {Scalar: shape.scalar, Mapping: shape.mapping, Sequence: shape.sequence}
@@ -147,18 +111,6 @@ class Walker:
             return self.budget(node, path)
         return None
 
-    def text(self, node: Scalar, path: Path) -> str | None:
-        if node.kind == "null":
-            self.wrong(node, path, "text", "write text or leave the key out")
-        elif node.kind == "boolean":
-            self.wrong(node, path, "text", f'quote it: "{node.text}"')
-        elif (odd := unseen(node.text)) is not None:
-            text = f"the character U+{ord(odd):04X} cannot be seen, and would stand in the header"
-            self.problems.add(self.place(node, path), text, "remove it")
-        else:
-            return node.text
-        return None
-
     def budget(self, node: Scalar, path: Path) -> Expression | int | None:
         match = _BUDGET.match(node.text)
         if match and len(match.group(1)) <= 9:
@@ -173,6 +125,14 @@ class Walker:
             )
             return None
         return self.formula(node, Whole(1, 2**40), path)
+
+    def listed(self, node: Sequence, shape: Formula, path: Path) -> Formulas:
+        """A vector written as a list, or a matrix as a list of rows."""
+        place = self.place(node, path)
+        if not node.items:
+            self.problems.add(place, "the list is empty", "write a list of numbers: [0, 0, 1]")
+            return Expression(BAD, "", place)
+        return Listed(tuple(self.value(item, shape, (*path, f"[{i}]")) for i, item in enumerate(node.items)), place)
 
     def formula(self, node: Node, shape: Formula | Whole, path: Path) -> Expression:
         """A number or an expression; its tree is BAD where it has been reported."""
@@ -197,12 +157,13 @@ class Walker:
             return Expression(Name(node.text), node.text, place)
         self.sources[place] = node
         try:
-            tree = parse(node.text, condition)
+            source = parse_source(node.text, condition, free=scope in ("initialize", "residual"))
         except ExpressionError as error:
             at = self.problems.at(*node.position(error.offset), place.path)
             self.problems.add(at, error.message, error.hint)
             return bad
-        expression = Expression(tree, node.text, place)
+        self.parsed[place] = source
+        expression = Expression(source.tree, node.text, place)
         self.formulas.append(Written(expression, scope, path))
         if isinstance(shape, Whole):
             self.whole.append((expression, shape))
@@ -291,6 +252,7 @@ class Walker:
             if only.key in fields and fields.get(only.key) is None:
                 continue  # that choice is itself a mistake
             chosen = fields.get(only.key, only.default)
+            chosen = "periodic" if isinstance(chosen, Fields) else chosen
             if chosen in only.values:
                 continue
             text = f"`{key.name}` is not used by {only.subject} `{chosen}`"

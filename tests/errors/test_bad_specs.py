@@ -36,7 +36,7 @@ CASES = [
     # types
     ("vehicle", "std: stdx,", "std: true,", "true", "states.px.std", "booleans are not numbers"),
     ("vehicle", "std: stdx,", "std: [1],", "[1]",
-     "states.px.std", "a number or an expression is wanted here, not a list"),
+     "states.px.std", "`std` of `px` is a number, not a 1-vector"),
     ("vehicle", "std: stdx,", "sdt: stdx,", "sdt", "states.px.sdt", "did you mean `std`?"),
     ("vehicle", "std: stdx,", "std: .nan,", ".nan", "states.px.std", "not finite"),
     ("vehicle", "std: stdx,", "std: 1_0,", "1_0", "states.px.std", "underscores; write 10"),

@@ -44,8 +44,8 @@ def test_vehicle() -> None:
     assert spec.measurements[0].gate.reset_after == 5
     assert spec.measurements[1].components[0].variance is None
     assert spec.measurements[3].R is not None
-    assert spec.initialize is not None
-    assert spec.initialize.states == {"px": "x", "py": "y"}
+    (start,) = spec.initialize
+    assert {state: e.tree for state, e in start.states.items()} == {"px": Name("x"), "py": Name("y")}
     assert spec.states[3].kind == "angle"
     assert spec.states[4].period is not None
     known = environment_of(spec)

@@ -8,9 +8,9 @@ import pytest
 
 from kfgen.spec import loads
 from kfgen.spec.affine import Affine
+from kfgen.spec.contexts import Context
 from kfgen.spec.expressions import parse
 from kfgen.spec.matrices import is_semidefinite, smallest_eigenvalue
-from kfgen.spec.scopes import Context
 
 SPEC = loads(
     "kfgen: 1\nname: a\nstates: {x: {init: 0, std: 1}, y: {init: 0, std: 1}}\nparameters: {p: 2}\n"

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from kfgen.filters.algebra.numbers import select
+from collections.abc import Mapping
+from fractions import Fraction
+
+from kfgen.filters.algebra.linalg import Rows, dot, plus, times
+from kfgen.filters.algebra.numbers import Number, select
 from kfgen.filters.bank.mode import Mode
 from kfgen.filters.bank.trace import BankTrace
 from kfgen.filters.base import CONST_KF, KF
 from kfgen.filters.steps.covariance import covariance_argument
+from kfgen.filters.steps.outputs import outputs_function
 from kfgen.geometry import heaviest
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
-from kfgen.ir.trace import Array, Value
+from kfgen.ir.trace import Array, Trace, Value
 from kfgen.model import Model
 
 
 class BankCovariance:
-    """Traces set_covariance and get_covariance. outdated: as in CovarianceCode, of all modes."""
+    """Traces set_covariance, get_covariance and get_outputs. outdated: as in CovarianceCode, of all modes."""
 
     def __init__(self, model: Model, modes: list[Mode], outdated: tuple[str, ...]) -> None:
         self.model = model
@@ -84,6 +89,34 @@ class BankCovariance:
             "get_covariance", [CONST_KF, out], schedule(t, taken | {"x", "P"}),
             "The covariance of the combined state: the modes' own, and their spread.", returns="void",
         )  # fmt: skip
+
+    def isolate(self, t: Trace, variances: Mapping[int, Value]) -> None:
+        """As a filter by itself does, in every mode."""
+        assert isinstance(t, BankTrace)
+        for mode in self.modes:
+            with t.of(mode.scope()):
+                mode.filter.isolate(t, variances)
+
+    def outputs(self, taken: frozenset[str], smallest: Fraction) -> list[Function]:
+        """What tells the outputs, where there are some."""
+        if not self.model.outputs:
+            return []
+        t = BankTrace(smallest)
+        return [outputs_function(t, self.model, lambda J: self._variances(t, J), taken)]
+
+    def _variances(self, t: BankTrace, J: Rows) -> list[Number]:
+        """The diagonal of J P J^T (k,), of P = sum of mu_i (P_i + d_i d_i^T)."""
+        mu = [t.name(t.element("kf.mu", i), f"mu_{mode.name}") for i, mode in enumerate(self.modes)]
+        totals: list[Number] = [0] * len(J)
+        deviations = self._deviations(t, mu)
+        for mode, m, d in zip(self.modes, mu, deviations, strict=True):
+            with t.of(mode.scope()):
+                own = mode.filter.variances(t, J)
+                apart = [dot(row, [d[i] for i in range(self.n)]) for row in J]
+                totals = [
+                    plus(total, times(m, plus(v, times(a, a)))) for total, v, a in zip(totals, own, apart, strict=True)
+                ]
+        return totals
 
     def _deviations(self, t: BankTrace, mu: list[Value]) -> list[Array]:
         """x of each mode less the mean; periodic states about the mode of the largest probability."""

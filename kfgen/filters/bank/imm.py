@@ -53,9 +53,8 @@ class Imm:
         fields = [field for mode in self.modes for field in mode.fields()]
         mu = Block("mu", len(self.modes), "probabilities of the modes", initial=bank.mu0)
         states = ("kf.x", *(mode.path("x") for mode in self.modes))
-        self.outdated = outdated
-        self.state = StateCode(self.model, (mu, *fields), (), outdated, states, bank.sensors)
-        self.covariance = BankCovariance(self.model, self.modes, outdated)
+        self.outdated, self.covariance = outdated, BankCovariance(self.model, self.modes, outdated)
+        self.state = StateCode(self.model, (mu, *fields), (), outdated, states, bank.sensors, self.covariance.isolate)
 
     def code(self, taken: frozenset[str]) -> FilterCode:
         """The complete filter. taken: names that locals must not have."""
@@ -66,6 +65,7 @@ class Imm:
             if sensor.spec.partial:
                 functions.append(self.update(k, taken, partial=True))
         functions += [self.state.set_state(taken), *self.covariance.functions(taken)]
+        functions += self.covariance.outputs(taken, self.scalar.smallest)
         if self.outdated:
             functions.append(self.redraw(taken))
         remarks = [f"{mode.name}: {text}" for mode in self.modes for text in mode.filter.remarks()]
@@ -129,7 +129,7 @@ class Imm:
     def predict(self, taken: frozenset[str]) -> Function:
         """All modes mixed, then each predicted; mu <- M^T mu."""
         t = BankTrace(self.scalar.smallest)
-        arguments, step = begin_predict(t, self.model)
+        arguments, step = begin_predict(t, self.model, self.state.first)
         scopes = [mode.scope() for mode in self.modes]
         mu = self._mu(t)
         t.section("probabilities after a switch, and of the mode before, given the mode now")
@@ -220,8 +220,8 @@ class Imm:
         t = BankTrace(self.scalar.smallest)
         sensors = [self._sensor(mode, k) for mode in self.modes]
         models = [mode.model.of(sensor) for mode, sensor in zip(self.modes, sensors, strict=True)]
-        arguments, used = begin_update(t, models, sensors, partial)
-        self.state.initialize(t, sensors[0], used)
+        arguments, used = begin_update(t, models, sensors, partial, self.state.first)
+        self.state.first.run(t, sensors[0], used)
         scopes = [mode.scope() for mode in self.modes]
         runs: list[tuple[Scope, Phases]] = []
         first: list[Judged | Made] = []
@@ -241,7 +241,7 @@ class Imm:
         self._store(t, runs, self.combined(t, made, mu), mu)
         fields = [mode.path("nis") for mode in self.modes]
         store_outcome(t, self.model, sensors, judged, log_likelihood, fields)
-        guards.settled(t, self.model)
+        guards.settled(t, self.model, sensors[0])
         name, doc = update_name(sensors[0], partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
 

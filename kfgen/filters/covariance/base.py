@@ -56,6 +56,10 @@ class Form(Protocol[P]):
         """Store a covariance given as the upper triangle of P and of its factors (D on the diagonal, U above)."""
         ...
 
+    def isolate(self, t: Trace, place: int, variance: Value) -> None:
+        """Store for the state at an inner place a variance of its own, at least 0, and no correlations."""
+        ...
+
     def functions(self, taken: frozenset[str], outdated: str) -> list[Function]:
         """Further functions of the filter that this form offers. outdated: as in CovarianceCode."""
         ...

@@ -12,6 +12,7 @@ from kfgen.ir.given import given
 from kfgen.ir.nodes import BOOL, Node
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
+from kfgen.model.model import SensorModel
 
 
 def arguments(t: Trace, needed: Mapping[str, Value] | None = None) -> None:
@@ -21,14 +22,15 @@ def arguments(t: Trace, needed: Mapping[str, Value] | None = None) -> None:
     t.needed = dict(needed or {})
 
 
-def settled(t: Trace, model: Model) -> None:
+def settled(t: Trace, model: Model, sensor: SensorModel | None = None) -> None:
     """NOT_FINITE at `arguments`, now that the whole function is recorded: each input and parameter by itself, for the
     sum of large numbers would overflow. A parameter needs no test where a later one shows it, and no other status can
-    come before."""
+    come before. sensor: of an update, whose own inputs are tested with them."""
     assert t.arguments_at is not None, "a function that reads what it is given"
     read = given(item for block in (t.block, *t.blocks.values()) for item in block.items if not isinstance(item, Node))
     seen = {node.data for node in shown_first(t) if node.op == "field"}
     paths = [f"u.{name}" for name in model.inputs if f"u.{name}" in read]
+    paths += [f"z.{name}" for name in (() if sensor is None else sensor.inputs) if f"z.{name}" in read]
     paths += [path for path in (f"kf.parameters.{name}" for name, _ in model.parameters) if path in read - seen]
     recorded = t.block.items
     t.block.items = []

@@ -169,12 +169,14 @@ class Ekf(SingleFilter):
         innovation = decorrelated(u.t, linear, R, u.used, smallest)
         for r in innovation.variances:
             require_nonnegative(r, "a measurement variance is negative")
-            self.suppose(r)
+            self.suppose(u.sensor, r)
         return innovation
 
-    def suppose(self, r: Value) -> None:
+    def suppose(self, sensor: SensorModel, r: Value) -> None:
         """Take a variance for positive that is not 0 within the declared ranges: 0 is then no case of its own."""
-        if self.scalar.uniform and not is_positive(r) and positive_within(r, process.declared_signs(self.model)):
+        if not self.scalar.uniform or is_positive(r):
+            return
+        if positive_within(r, process.declared_signs(self.model, sensor)):
             assume_positive(r)
 
     def spread(self, u: Update, linear: Linearised) -> Symmetric:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from copy import copy
 from typing import Any, Self
 
+from kfgen.filters.algebra.linalg import Rows
+from kfgen.filters.algebra.numbers import Number
 from kfgen.filters.base import Block, FilterCode
 from kfgen.filters.covariance.base import Form
 from kfgen.filters.frame import guards
@@ -15,6 +18,7 @@ from kfgen.filters.steps.adapt import AdaptedQ, AdaptedR
 from kfgen.filters.steps.compensation import Compensation
 from kfgen.filters.steps.covariance import CovarianceCode, get_matrix
 from kfgen.filters.steps.gate import gate, store_outcome
+from kfgen.filters.steps.outputs import outputs_function
 from kfgen.filters.steps.phases import Judged, Phases, begin_predict, begin_update, predict_doc, update_name
 from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.state import StateCode
@@ -55,7 +59,9 @@ class SingleFilter(ABC):
         extra = [*self.compensation.blocks(), *form.named([*extra, *self.extra_blocks()])]
         outdated = (self.outdated,) if self.outdated else ()
         self.covariance = CovarianceCode(model, form, scalar.epsilon, self.outdated)
-        self.state = StateCode(model, self.covariance.blocks(), tuple(extra), outdated)
+        self.state = StateCode(
+            model, self.covariance.blocks(), tuple(extra), outdated, isolating=self.isolate,
+        )  # fmt: skip
 
     # the steps, in phases
 
@@ -78,6 +84,7 @@ class SingleFilter(ABC):
             if sensor.spec.partial:
                 functions.append(self.update(sensor, taken, partial=True))
         functions += [self.state.set_state(taken), *self.covariance.functions(taken)]
+        functions += self.outputs(taken)
         for sensor in model.sensors:
             adapted = self.adapted_R(sensor)
             if adapted is not None:
@@ -163,7 +170,7 @@ class SingleFilter(ABC):
     def predict(self, taken: frozenset[str]) -> Function:
         """x <- f(x, u, 0), P <- F P F^T + Q + G Qw G^T."""
         t = Trace(self.scalar.smallest)
-        arguments, step = begin_predict(t, self.model)
+        arguments, step = begin_predict(t, self.model, self.state.first)
         for _ in self.predicting(t, step):
             pass
         process.store_time(t, self.model, step)
@@ -174,8 +181,8 @@ class SingleFilter(ABC):
     def update(self, sensor: SensorModel, taken: frozenset[str], partial: bool = False) -> Function:
         """The update with the whole vector z of a sensor, or with the components that a mask selects."""
         model, t = self.model, Trace(self.scalar.smallest)
-        arguments, used = begin_update(t, [model.of(sensor)], [sensor], partial)
-        self.state.initialize(t, sensor, used)
+        arguments, used = begin_update(t, [model.of(sensor)], [sensor], partial, self.state.first)
+        self.state.first.run(t, sensor, used)
         for phase in self.of(sensor).updating(t, sensor, used):
             if isinstance(phase, Judged):
                 gate(t, model, [sensor], [phase.nis], used)
@@ -184,9 +191,27 @@ class SingleFilter(ABC):
         assert made.nis is not None
         assert made.log_likelihood is not None
         store_outcome(t, model, [sensor], [made.nis], made.log_likelihood)
-        guards.settled(t, model)
+        guards.settled(t, model, sensor)
         name, doc = update_name(sensor, partial)
         return Function(name, arguments, schedule(t, taken | {a.name for a in arguments}), doc)
+
+    def outputs(self, taken: frozenset[str]) -> list[Function]:
+        """What tells the outputs, where there are some."""
+        if not self.model.outputs:
+            return []
+        t = Trace(self.scalar.smallest)
+        return [outputs_function(t, self.model, lambda J: self.variances(t, J), taken)]
+
+    def variances(self, t: Trace, J: Rows) -> list[Number]:
+        """The diagonal of J P J^T (k,), J (k, n) in the spec's order."""
+        form = self.form.straight()
+        P = form.load(t)
+        return [form.variance(P, [row[i] for i in self.order]) for row in J]
+
+    def isolate(self, t: Trace, variances: Mapping[int, Value]) -> None:
+        """Give errors, by their places in the spec's order, variances of their own, correlated with none; stored."""
+        for i, variance in variances.items():
+            self.form.isolate(t, self.order.index(i), variance)
 
     # ends
 

@@ -6,12 +6,15 @@ from fractions import Fraction
 
 from kfgen.errors import SpecError
 from kfgen.filters.algebra import linalg
-from kfgen.filters.algebra.linalg import Vector
+from kfgen.filters.algebra.linalg import Rows, Vector
+from kfgen.filters.algebra.numbers import Number
 from kfgen.filters.algebra.riccati import Gain, Rules, Scalar, steady
 from kfgen.filters.base import CONST_KF, INPUTS, KF, FilterCode, sensor_argument
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
 from kfgen.filters.steps.gate import gate, store_outcome, tested
+from kfgen.filters.steps.needed import read
+from kfgen.filters.steps.outputs import outputs_function
 from kfgen.filters.steps.sensor import SensorCode, needs_inputs, total
 from kfgen.filters.steps.state import StateCode
 from kfgen.ir.program import Argument, Function
@@ -50,6 +53,9 @@ class Steady:
         functions = [self.state.init(taken), self.predict(taken)]
         functions += [self.update(s, g, taken) for s, g in zip(self.model.sensors, self.gains, strict=True)]
         functions += [self.state.set_state(taken), self.get_covariance(taken)]
+        if self.model.outputs:
+            t = Trace(self.scalar.smallest)
+            functions.append(outputs_function(t, self.model, self.variances, taken))
         return FilterCode(
             model=self.model,
             blocks=tuple(self.state.blocks()),
@@ -62,6 +68,7 @@ class Steady:
         """x <- f(x, u, 0)."""
         model, t = self.model, Trace(self.scalar.smallest)
         arguments: list[Argument] = [KF]
+        self.state.first.wait(t)
         if model.inputs:
             arguments.append(INPUTS)
         guards.arguments(t)
@@ -85,11 +92,13 @@ class Steady:
         """x <- x + K (z - h), nis by the constant S."""
         model, t = self.model, Trace(self.scalar.smallest)
         arguments: list[Argument] = [KF, sensor_argument(sensor.name)]
-        if needs_inputs(model, sensor):
+        first = self.state.first
+        first.wait(t, sensor)
+        if needs_inputs(model, sensor) or first.takes_inputs(sensor):
             arguments.append(INPUTS)
-        guards.arguments(t)
+        guards.arguments(t, first.needed(t, sensor, None, {}, read([model], [sensor])))
         tested(t, model, [sensor])
-        self.state.initialize(t, sensor, None)
+        first.run(t, sensor, None)
         t.section("innovation")
         code = SensorCode(t, model, sensor, list(range(self.n)))
         prior = code.prior()
@@ -129,6 +138,11 @@ class Steady:
             squares = squares + nu * nu * (1 / scalar.s)
             logs = logs + t.function("log", scalar.s) + t.value(log_two_pi())
         return squares, logs
+
+    def variances(self, J: Rows) -> list[Number]:
+        """The diagonal of J P J^T (k,) with the constant P."""
+        P = self.gains[-1].P
+        return [linalg.dot(row, [linalg.dot(p, row) for p in P]) for row in J]
 
     def get_covariance(self, taken: frozenset[str]) -> Function:
         """P in the steady state, after the update of the last sensor."""

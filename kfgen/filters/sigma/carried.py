@@ -67,7 +67,7 @@ def _seen(model: Model, sensor: SensorModel) -> list[Dual]:
     used = model.uses(*sensor.h)
     x = {name: Dual(t.element("kf.x", i), {name: t.one}) for i, name in enumerate(model.states)}
     noises = cloud.symbolic_noises(t, [w.name for w in sensor.noises])
-    duals = {**x, **noises, **process.parameters_and_inputs(t, model)}
+    duals = {**x, **noises, **process.parameters_and_inputs(t, model, sensor=sensor)}
     if "t" in used:
         duals["t"] = process.time_now(t, model)
     if model.dt is not None:

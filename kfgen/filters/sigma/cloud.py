@@ -14,7 +14,7 @@ import sympy
 from kfgen.filters.algebra.dual import Dual, Evaluator
 from kfgen.filters.algebra.linalg import Vector, plus, times
 from kfgen.filters.algebra.numbers import is_zero, select
-from kfgen.filters.base import CONST_KF, INPUTS
+from kfgen.filters.base import CONST_KF, INPUTS, sensor_argument
 from kfgen.filters.sigma.points import PointSet
 from kfgen.filters.steps import process
 from kfgen.geometry.part import Part
@@ -33,7 +33,7 @@ class Private:
     """A private function and what it is given beside its arrays."""
 
     function: Function
-    given: list[str]  # of kf, u, step
+    given: list[str]  # of kf, u, z, step
 
     def arguments(self, step: Value | None) -> list[str | Value]:
         out: list[str | Value] = []
@@ -46,8 +46,8 @@ class Private:
         return out
 
 
-def given_for(body: list[Statement]) -> list[Argument]:
-    """What a scheduled body reads of the filter, the inputs and the step."""
+def given_for(body: list[Statement], sensor: SensorModel | None = None) -> list[Argument]:
+    """What a scheduled body reads of the filter, the inputs, a measurement of the sensor, and the step."""
     read: set[str] = set()
     for statement in walk(body):
         if isinstance(statement, Call):
@@ -58,13 +58,21 @@ def given_for(body: list[Statement]) -> list[Argument]:
             if node.op in ("field", "element"):
                 read.add(str(node.data).partition(".")[0])
             stack += node.args
-    return [a for a in (CONST_KF, INPUTS, _STEP) if a.name in read]
+    measured = [] if sensor is None or not sensor.inputs else [sensor_argument(sensor.name)]
+    return [a for a in (CONST_KF, INPUTS, *measured, _STEP) if a.name in read]
 
 
-def _duals(t: Trace, model: Model, x: list[Value], noises: dict[str, Value], used: set[str]) -> dict[str, Dual]:
+def image(sensor: SensorModel) -> str:
+    """The name of an array of what is measured at a point: z, where that is not the measurement itself."""
+    return "seen_z" if sensor.inputs else "z"
+
+
+def _duals(
+    t: Trace, model: Model, x: list[Value], noises: dict[str, Value], used: set[str], sensor: SensorModel | None = None
+) -> dict[str, Dual]:
     duals = {name: Dual(value) for name, value in zip(model.states, x, strict=True)}
     duals.update({name: Dual(value) for name, value in noises.items()})
-    duals.update(process.parameters_and_inputs(t, model))
+    duals.update(process.parameters_and_inputs(t, model, sensor=sensor))
     if "t" in used:
         duals["t"] = process.time_now(t, model)
     if model.dt is not None:
@@ -110,9 +118,11 @@ def dynamics(model: Model, carried: tuple[str, ...], taken: frozenset[str]) -> P
     return private("f", body, [out], "x <- f(x, u, w), in place")
 
 
-def private(name: str, body: list[Statement], arrays: list[Argument], doc: str) -> Private:
+def private(
+    name: str, body: list[Statement], arrays: list[Argument], doc: str, sensor: SensorModel | None = None
+) -> Private:
     """A private function that is given what its body reads, and arrays."""
-    arguments = given_for(body)
+    arguments = given_for(body, sensor)
     function = Function(name, [*arguments, *arrays], body, doc, returns="void", private=True)
     return Private(function, [a.name for a in arguments])
 
@@ -124,13 +134,14 @@ def measurement(model: Model, sensor: SensorModel, carried: tuple[str, ...], tak
     noises = {w.name: t.zero for w in sensor.noises}
     for k, name in enumerate(carried):
         noises[name] = t.name(t.element("x", n + k), name)
-    evaluator = Evaluator(t, model, _duals(t, model, _state(t, model, used), noises, used))
+    evaluator = Evaluator(t, model, _duals(t, model, _state(t, model, used), noises, used, sensor))
+    name = image(sensor)
     for i, e in enumerate(sensor.h):
-        t.store("z", i, evaluator.value(e))
+        t.store(name, i, evaluator.value(e))
     point = Argument("x", "{name}_real_t", pointer=True, size=n + len(carried))
-    out = Argument("z", "{name}_real_t", pointer=True, constant=False, size=len(sensor.h))
-    body = schedule(t, taken | {"kf", "u", "x", "z"})
-    return private(f"h_{sensor.name}", body, [point, out], f"what {sensor.name} measures at x")
+    out = Argument(name, "{name}_real_t", pointer=True, constant=False, size=len(sensor.h))
+    body = schedule(t, taken | {"kf", "u", "x", "z", name})
+    return private(f"h_{sensor.name}", body, [point, out], f"what {sensor.name} measures at x", sensor)
 
 
 def fill(t: Trace, cloud: Array, points: PointSet, columns: list[Vector], step: int = 1) -> None:
@@ -173,7 +184,7 @@ def difference(
     residual = sensor.residual[i]
     if residual is not None:
         name = sensor.spec.components[i].name
-        evaluator = Evaluator(t, model, _duals(t, model, x, {w.name: t.zero for w in sensor.noises}, used))
+        evaluator = Evaluator(t, model, _duals(t, model, x, {w.name: t.zero for w in sensor.noises}, used, sensor))
         evaluator.bind(sympy.Symbol(f"z_{name}"), z)
         evaluator.bind(sympy.Symbol(f"h_{name}"), base)
         return evaluator.value(residual)

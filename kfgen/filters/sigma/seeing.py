@@ -105,7 +105,7 @@ class Seeing:
         assert self.h is not None
         t = Trace()
         x = [t.name(t.element("x", i), name) for i, name in enumerate(model.states)]
-        point, z = t.array("point", self.stride), t.array("z", m)
+        point, z = t.array("point", self.stride), t.array(cloud.image(sensor), m)
         store = None if points.theta == 0 else t.array("dz", len(points.rows) * m)
         call = self.h.arguments(None)
         middle = [t.zero] * n
@@ -113,7 +113,7 @@ class Seeing:
             middle = [t.name(t.element("middle", i), f"{name}_middle") for i, name in enumerate(model.states)]
         for i in range(self.stride):
             point[i] = (x[i] + middle[i] if i < n else t.zero)
-        t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
+        t.call(self.h.function, [*call, ("point", 0), (z.name, 0)])
         names = [c.name for c in sensor.spec.components]
         base = [t.name(z[a], f"{name}_centre") for a, name in enumerate(names)]
         shift = [t.variable(f"shift_{name}", 0) for name in names]
@@ -129,7 +129,7 @@ class Seeing:
             for i in range(self.stride):
                 own = t.element("cloud", at + i)
                 point[i] = x[i] + own if i < n else own
-            t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
+            t.call(self.h.function, [*call, ("point", 0), (z.name, 0)])
             apart = [cloud.difference(t, model, sensor, part, a, z[a], base[a], x) for a, part in enumerate(self.parts)]
             d = [t.name(v, f"dz_{name}") for v, name in zip(apart, names, strict=True)]
             part = [t.element("cloud", at + i) for i in range(self.stride)]
@@ -174,9 +174,9 @@ class Seeing:
         sizes = [("x", n, True), *([("middle", n, True)] if self.recalls and points.centre else []),
                  ("cloud", len(points.rows) * self.stride, True), ("seen", self.size, False)]  # fmt: skip
         arrays = [Argument(name, "{name}_real_t", pointer=True, constant=c, size=s) for name, s, c in sizes]
-        body = schedule(t, taken | {"kf", "u", "x", "z", "middle", "cloud", "seen"})
+        body = schedule(t, taken | {"kf", "u", "x", "z", z.name, "middle", "cloud", "seen"})
         doc = f"what the points predict of {sensor.name}: mean, covariance, covariances with the state"
-        return cloud.private(f"{'recall' if self.recalls else 'see'}_{sensor.name}", body, arrays, doc)
+        return cloud.private(f"{'recall' if self.recalls else 'see'}_{sensor.name}", body, arrays, doc, sensor)
 
     # in the update -----------------------------------------------------------------------------------
 

@@ -125,7 +125,7 @@ class _Whole:
         if u.adapted is None and any(r.constant is None for row in self.R for r in row):
             for d in decorrelated(u.t, linear, self.R).variances:
                 require_nonnegative(d, "R is not positive semidefinite")
-                ukf.suppose(d)
+                ukf.suppose(u.sensor, d)
         diagonal = all(is_zero(self.R[i][j]) for i in range(m) for j in range(m) if i != j)
         self.definite = seeing.points.positive and seeing.points.exact
         self.exact = any(is_zero(r) for r in pivots(self.R, 8 * m * ukf.scalar.epsilon))  # without noise

@@ -14,7 +14,6 @@ from kfgen.ir.program import Store
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
 from kfgen.model.model import SensorModel
-from kfgen.model.options import GateModel
 from kfgen.quantiles import chi2_quantile
 
 
@@ -31,7 +30,7 @@ def gate(
         return
     t.section("gate")
     m = sensors[0].dimension
-    beyond = reduce(and_, [v > _threshold(t, model, g, m, used) for g, v in zip(gates, nis, strict=True)])
+    beyond = reduce(and_, [v > _threshold(t, model, s, m, used) for s, v in zip(sensors, nis, strict=True)])
     before = [Store("kf.nis", None, smallest(t, nis).node)]
     if not counts_gated(model, sensors):
         t.guard(beyond, "GATED", before=before)
@@ -51,16 +50,19 @@ def tested(t: Trace, model: Model, sensors: list[SensorModel]) -> None:
     """NOT_FINITE where a threshold is a formula that overflows."""
     for sensor in sensors:
         if sensor.gate is not None and sensor.gate.threshold is not None:
-            value = _threshold(t, model, sensor.gate, 1, None)
+            value = _threshold(t, model, sensor, 1, None)
             if value.constant is None and value.node.op != "field":
                 t.guard(~t.finite(value), "NOT_FINITE")
 
 
-def _threshold(t: Trace, model: Model, gate: GateModel, m: int, used: list[Value] | None) -> Value:
+def _threshold(t: Trace, model: Model, sensor: SensorModel, m: int, used: list[Value] | None) -> Value:
+    gate = sensor.gate
+    assert gate is not None
     if gate.probability is not None:
         return chi2_threshold(t, gate.probability, m, used)
     values = {model.symbols[name]: t.field(f"kf.parameters.{name}") for name, _ in model.parameters}
     values |= {model.symbols[name]: t.field(f"u.{name}") for name in model.inputs}
+    values |= {model.symbols[name]: t.field(f"z.{name}") for name in sensor.inputs}
     return Lowering(t, values)(gate.threshold)
 
 

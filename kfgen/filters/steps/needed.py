@@ -26,6 +26,7 @@ def needed(models: Sequence[Model], sensors: Sequence[SensorModel], used: Sequen
                 found.setdefault(name, set()).add(places)
     paths = {name: f"u.{name}" for model in models for name in model.inputs}
     paths |= {name: f"kf.parameters.{name}" for model in models for name, _ in model.parameters}
+    paths |= {name: f"z.{name}" for sensor in sensors for name in sensor.inputs}
     always = frozenset[int]()
     out: dict[str, Value] = {}
     for name, path in paths.items():
@@ -38,6 +39,12 @@ def needed(models: Sequence[Model], sensors: Sequence[SensorModel], used: Sequen
         conditions += [used[i] & used[j] for i, j in pairs]
         out[path] = reduce(or_, conditions)
     return out
+
+
+def read(models: Sequence[Model], sensors: Sequence[SensorModel]) -> set[str]:
+    """Names that an update itself evaluates."""
+    pairs = zip(models, sensors, strict=True)
+    return {n for model, sensor in pairs for _, formulas in _formulas(model, sensor) for n in model.uses(*formulas)}
 
 
 def _formulas(model: Model, sensor: SensorModel) -> Iterable[tuple[Places, list[Any]]]:

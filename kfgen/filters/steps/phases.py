@@ -13,8 +13,9 @@ from typing import Any
 from kfgen.filters.base import DT, INPUTS, KF, MASK, sensor_argument
 from kfgen.filters.frame import guards
 from kfgen.filters.steps import process
+from kfgen.filters.steps.first import First
 from kfgen.filters.steps.gate import tested
-from kfgen.filters.steps.needed import needed
+from kfgen.filters.steps.needed import needed, read
 from kfgen.filters.steps.process import Step
 from kfgen.filters.steps.sensor import needs_inputs
 from kfgen.ir.program import Argument
@@ -44,8 +45,9 @@ class Made:
 Phases = Generator[Judged | Made, None, None]
 
 
-def begin_predict(t: Trace, model: Model) -> tuple[list[Argument], Step]:
+def begin_predict(t: Trace, model: Model, first: First) -> tuple[list[Argument], Step]:
     """The arguments of a prediction, tested."""
+    first.wait(t)
     arguments: list[Argument] = [KF]
     if model.inputs:
         arguments.append(INPUTS)
@@ -63,7 +65,7 @@ def predict_doc(model: Model) -> str:
 
 
 def begin_update(
-    t: Trace, models: list[Model], sensors: list[SensorModel], partial: bool
+    t: Trace, models: list[Model], sensors: list[SensorModel], partial: bool, first: First
 ) -> tuple[list[Argument], list[Value] | None]:
     """The arguments of an update of one sensor, as one model or several have it, tested; and whether each component
     counts, where a mask tells."""
@@ -75,9 +77,11 @@ def begin_update(
         for bit in used[1:]:
             some = some | bit
         t.guard(~some, "OK")
-    if any(needs_inputs(model, sensor) for model, sensor in zip(models, sensors, strict=True)):
+    first.wait(t, sensors[0])
+    pairs = zip(models, sensors, strict=True)
+    if any(needs_inputs(model, sensor) for model, sensor in pairs) or first.takes_inputs(sensors[0]):
         arguments.append(INPUTS)
-    guards.arguments(t, needed(models, sensors, used))
+    guards.arguments(t, first.needed(t, sensors[0], used, needed(models, sensors, used), read(models, sensors)))
     tested(t, models[0], sensors)
     if partial:
         arguments.append(MASK)

@@ -13,6 +13,7 @@ from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import assume_positive, is_zero, require_nonnegative
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
+from kfgen.model.model import SensorModel
 from kfgen.spec import constants
 
 NEGATIVE = "a noise variance is negative"
@@ -81,19 +82,25 @@ def step_length(t: Trace, model: Model) -> Step:
     return Step(step, raw)
 
 
-def parameters_and_inputs(t: Trace, model: Model, inputs: bool = True) -> dict[str, Dual]:
+def parameters_and_inputs(
+    t: Trace, model: Model, inputs: bool = True, sensor: SensorModel | None = None
+) -> dict[str, Dual]:
+    """What a caller sets. sensor: the one whose own inputs come too."""
     out = {name: Dual(t.field(f"kf.parameters.{name}")) for name, _ in model.parameters}
     if inputs:
         out.update({name: Dual(t.field(f"u.{name}")) for name in model.inputs})
+    if sensor is not None:
+        out.update({name: Dual(t.field(f"z.{name}")) for name in sensor.inputs})
     return out
 
 
-def declared_signs(model: Model) -> dict[str, int]:
-    """The signs of inputs and parameters whose declared range excludes 0, by their paths."""
+def declared_signs(model: Model, sensor: SensorModel | None = None) -> dict[str, int]:
+    """The signs of inputs and parameters whose declared range excludes 0, by their paths; those of a sensor's too."""
     found: dict[str, int] = {}
     spec = model.spec
     given = [(f"u.{i.name}", i.range) for i in spec.inputs]
     given += [(f"kf.parameters.{p.name}", p.range) for p in spec.parameters]
+    given += [] if sensor is None else [(f"z.{i.name}", i.range) for i in sensor.spec.inputs]
     for path, limits in given:
         if limits is not None:
             low, high = (float(constants.value(limit.tree, spec)) for limit in limits)

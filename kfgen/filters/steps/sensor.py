@@ -108,7 +108,7 @@ class SensorCode:
 
     def _evaluator(self, given: dict[str, Dual]) -> Evaluator:
         t, model = self.t, self.model
-        given.update(process.parameters_and_inputs(t, model))
+        given.update(process.parameters_and_inputs(t, model, sensor=self.sensor))
         if "t" in self.used:
             given["t"] = process.time_now(t, model)
         if model.dt is not None:

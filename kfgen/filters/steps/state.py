@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from kfgen.filters.algebra.numbers import select
 from kfgen.filters.base import KF, Block
 from kfgen.filters.frame.runs import put
-from kfgen.filters.steps.compensation import FIELD, Compensation
-from kfgen.ir.program import Argument, Function, Store
+from kfgen.filters.steps.compensation import Compensation
+from kfgen.filters.steps.first import First, Isolating
+from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
@@ -32,13 +33,14 @@ class StateCode:
     def __init__(
         self, model: Model, covariance: tuple[Block, ...], extra: tuple[Block, ...] = (),
         outdated: tuple[str, ...] = (), states: tuple[str, ...] = ("kf.x",),
-        sensors: Sequence[Sequence[SensorModel]] | None = None,
+        sensors: Sequence[Sequence[SensorModel]] | None = None, isolating: Isolating | None = None,
     ) -> None:
         """covariance: the fields that hold it; extra: what else the algorithm keeps. states: the fields that hold x.
 
         outdated: fields that say whether something of it belongs to the present state, false when that is set.
-        sensors: each as every mode of a bank has it.
+        sensors: each as every mode of a bank has it. isolating: of the covariances, where some are kept.
         """
+        self.first = First(model, states, outdated, self.confined, isolating)
         self.sensors = [(sensor,) for sensor in model.sensors] if sensors is None else sensors
         self.outdated = outdated
         self.states = states
@@ -67,9 +69,7 @@ class StateCode:
             else:
                 out.append(Block("t", None, "time since init [s]"))
                 out.append(Block("t_lost", None, "what the sum of t has rounded away [s]"))
-        if model.spec.initialize is not None:
-            out.append(Block("initialized", None, "the first measurement has set the state", kind="bool"))
-        return out
+        return [*out, *self.first.blocks()]
 
     def confined(self, t: Trace, x: list[Value]) -> list[Value]:
         """x within its bounds, angles wrapped. Spec's order."""
@@ -83,34 +83,6 @@ class StateCode:
                 value = select(value < low, low, select(value > high, high, value))
             out.append(part.placed(value))
         return out
-
-    def initialize(self, t: Trace, sensor: SensorModel, used: list[Value] | None) -> None:
-        """The first complete measurement of the sensor named in `initialize` sets the state and ends the update.
-
-        used: whether each component counts, where a mask tells.
-        """
-        start = self.model.spec.initialize
-        if start is None or start.sensor != sensor.name:
-            return
-        t.section("the first measurement sets the state")
-        done = t.wrapped(t.pool.make("field", (), "kf.initialized", "bool"))
-        readings = [t.field(f"z.{c.name}") for c in sensor.spec.components]
-        if used is not None:
-            names = [c.name for c in sensor.spec.components]
-            for component in start.states.values():
-                done = done | ~used[names.index(component)]
-            readings = [select(u, z, t.zero) for u, z in zip(used, readings, strict=True)]
-        t.guard(~t.finite(sum(readings[1:], readings[0])), "NOT_FINITE")
-        x = [t.field(f"z.{start.states[s]}") if s in start.states else t.zero for s in self.model.states]
-        x = self.confined(t, x)
-        set_here = [i for i, s in enumerate(self.model.states) if s in start.states]
-        stores = [Store(path, t.pool.integer(i), x[i].node) for path in self.states for i in set_here]
-        stores.append(Store("kf.nis", None, t.pool.zero))
-        stores.append(Store("kf.initialized", None, t.pool.boolean(True)))
-        stores += [Store(path, None, t.pool.boolean(False)) for path in self.outdated]
-        second = Compensation(self.model).place
-        stores += [Store(f"kf.{FIELD}", t.pool.integer(second[i]), t.pool.zero) for i in set_here if i in second]
-        t.guard(~done, "OK", before=stores)
 
     # functions ---------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from kfgen.filters.base import FilterCode
+from kfgen.filters.steps.outputs import DEVIATION, FUNCTION, VALUE
 from kfgen.fixed.arithmetic.limits import OUTSIDE
 from kfgen.fixed.arithmetic.rounding import size_of
 from kfgen.fixed.formats.formats import HEADROOM, Formats, Quantity, above, exponent
@@ -46,6 +47,12 @@ class Interface:
             f.ranges.see(("number", "dt"), float(high or 0))
             self._quantity(("number", "dt"), "dt", float(high or 0), 4)
         z = {s.name: [self._component(s, k) for k in range(len(s.h))] for s in self.model.sensors}
+        for s in self.model.sensors:
+            for each in s.spec.inputs:
+                own = ("number", f"update_{s.name}", f"z.{each.name}")
+                self._quantity(own, f"{s.name}.{each.name}", self._limit(each.range), 2)
+        for output in self.model.outputs:
+            self._output(output.name)
         one = -f.bits
         for b, mode in enumerate(self.code.modes):
             f.fixed[f.arrays.element(("array", "kf.mu"), b)] = one
@@ -56,6 +63,12 @@ class Interface:
             f.fixed["number", f"kf.{name}"] = one
         f.fixed["number", "kf.t"] = -12
         self._arguments(x, z)
+
+    def _output(self, name: str) -> None:
+        """Of an output and its standard deviation, which share a format."""
+        value, deviation = (("number", FUNCTION, f"{argument}.{name}") for argument in (VALUE, DEVIATION))
+        self.f.ranges.see(value, self.f.ranges.largest(deviation))
+        self.f.fixed[deviation] = self._quantity(value, name, 0.0, HEADROOM + 1)
 
     def _arguments(self, x: list[int], z: dict[str, list[int]]) -> None:
         """Of the arrays that functions take or give. x, z: exponents of the states, and of each sensor's components."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kfgen.filters.base import FilterCode
+from kfgen.filters.steps.outputs import FUNCTION, VALUE
 from kfgen.fixed.formats.formats import Formats
 from kfgen.model import Model
 
@@ -15,8 +16,9 @@ def units(code: FilterCode, formats: Formats) -> tuple[tuple[str, int], ...]:
     out += [(each.name, ("number", f"kf.parameters.{each.name}")) for each in spec.parameters]
     out += [
         (f"{s.name}_{c.name}", ("number", f"update_{s.name}", f"z.{c.name}"))
-        for s in spec.measurements for c in s.components
+        for s in spec.measurements for c in s.fields
     ]  # fmt: skip
+    out += [(output.name, ("number", FUNCTION, f"{VALUE}.{output.name}")) for output in spec.outputs]
     if spec.dt is not None and spec.dt.run_time:
         out.append(("dt", ("number", "dt")))
     return tuple((name.upper(), formats.fixed[cell]) for name, cell in out)

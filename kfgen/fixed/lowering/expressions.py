@@ -25,7 +25,7 @@ class Expressions(Functions):
     def index(self, node: Node) -> Node:
         """An expression of integers or truth values."""
         match node.op:
-            case "const" | "counter" | "field" | "bit":
+            case "const" | "counter" | "field" | "bit" | "present":
                 return node
             case "variable":
                 return self.c.known.get(node.data, node)

@@ -70,6 +70,9 @@ def number_of(function: Function, path: str) -> Cell:
     """The key of a number that a function is given."""
     if path.startswith(("kf.", "u.")) or path == "dt":
         return ("number", path)
+    if function.private and path.startswith("z."):  # of the measurement of an update that calls it
+        (sensor,) = [a.type.removeprefix("{name}_").removesuffix("_t") for a in function.arguments if a.name == "z"]
+        return ("number", f"update_{sensor}", path)
     return ("number", function.name.removesuffix("_masked"), path)
 
 

@@ -16,8 +16,8 @@ Span = tuple[float, float]
 class Box:
     """Low and high of each quantity; None (and no entry) where nothing is declared.
 
-    states (n): their bounds or ranges, or half a period to each side. readings: (sensor, component) -> its range.
-    dt: of a step that is given at run time, from its least to its greatest.
+    states (n): their bounds or ranges, or half a period to each side. readings: (sensor, component or input of its
+    own) -> its range. dt: of a step that is given at run time, from its least to its greatest.
     """
 
     states: tuple[Span | None, ...]
@@ -74,7 +74,7 @@ def box_of(model: Model) -> Box:
         parameters=parameters,
         readings={
             (s.name, c.name): limits(c.range, spec)
-            for s in spec.measurements for c in s.components if c.range is not None
+            for s in spec.measurements for c in s.fields if c.range is not None
         },
         dt=_steps(low, high, model),
     )  # fmt: skip

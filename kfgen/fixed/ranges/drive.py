@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from kfgen.fixed.ranges.box import Box, clipped
+from kfgen.fixed.ranges.box import Box, Span, clipped
 from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.legs import LEGS, Leg, at, legs
 from kfgen.fixed.ranges.weather import Weather
@@ -96,7 +96,7 @@ class Drive:
             end = DARK * rows + BLINK if leg.corner else rows - 2  # at the ends of everything variances grow fast
             dark = leg.dark and DARK * rows <= row < end
             sensors = () if dark else self.model.sensors
-            readings = {s.name: self._reading(mode, i, random) for i, s in enumerate(sensors)}
+            readings = {s.name: self._reading(leg, row, mode, i, random) for i, s in enumerate(sensors)}
             if not player.row(inputs, dt, readings, row):
                 return
             self._note(leg, inputs, dt)
@@ -122,15 +122,17 @@ class Drive:
 
     def _inputs(self, leg: Leg, row: int, random: Random) -> dict[str, float]:
         """At the ends of their ranges by turns, or about a place in them."""
-        out = {}
-        for i, name in enumerate(self.model.inputs):
-            span, place = self.box.inputs.get(name), leg.places[f"u.{name}"]
-            if leg.corner:
-                place = place if row // (HELD + 5 * i) % 2 == 0 else 1.0 - place
-            else:
-                place += 0.1 * (2 * random.random() - 1)
-            out[name] = at((-1.0, 1.0) if span is None else span, place)
-        return out
+        spans = [(name, self.box.inputs.get(name), f"u.{name}") for name in self.model.inputs]
+        return {name: self._input(leg, row, i, span, key, random) for i, (name, span, key) in enumerate(spans)}
+
+    def _input(self, leg: Leg, row: int, i: int, span: Span | None, key: str, random: Random) -> float:
+        """The i-th of some inputs, its place in the leg under a key."""
+        place = leg.places[key]
+        if leg.corner:
+            place = place if row // (HELD + 5 * i) % 2 == 0 else 1.0 - place
+        else:
+            place += 0.1 * (2 * random.random() - 1)
+        return at((-1.0, 1.0) if span is None else span, place)
 
     def _dt(self, leg: Leg, row: int, random: Random) -> float:
         weather, span = self.weather, self.box.dt
@@ -142,9 +144,12 @@ class Drive:
             return span[int(leg.places["dt"] < 0.5) if row // HELD % 3 == 2 else int(leg.places["dt"] >= 0.5)]
         return at(span, random.random() ** 2) if row % 3 else weather.nominal
 
-    def _reading(self, mode: int, k: int, random: Random) -> list[float]:
-        sensor = self.model.sensors[k]
-        return [
-            clipped(z, self.box.readings.get((sensor.name, c.name)))
-            for z, c in zip(self.truth.see(mode, k, random), sensor.spec.components, strict=True)
+    def _reading(self, leg: Leg, row: int, mode: int, k: int, random: Random) -> list[float]:
+        sensor, spans = self.model.sensors[k], self.box.readings
+        given = [
+            self._input(leg, row, i, spans.get((sensor.name, name)), f"z.{sensor.name}.{name}", random)
+            for i, name in enumerate(sensor.inputs)
         ]
+        seen = self.truth.see(mode, k, random, given)
+        names = [c.name for c in sensor.spec.components]
+        return [*(clipped(z, spans.get((sensor.name, name))) for z, name in zip(seen, names, strict=True)), *given]

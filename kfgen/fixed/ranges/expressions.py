@@ -70,7 +70,7 @@ class ExpressionSource:
             case "counter":
                 return f"c_{node.data}"
             case "field":
-                if self.f.private and not node.data.startswith(("kf.", "u.")):
+                if self.f.private and not node.data.startswith(("kf.", "u.", "z.")):
                     return f"n_{node.data}"
                 return f"N[{node.data!r}]"
             case "element":
@@ -84,6 +84,8 @@ class ExpressionSource:
             case "bit":
                 path, place = node.data
                 return f"bool(N[{path!r}] >> {place} & 1)"
+            case "present":
+                return "True"
             case "finite":
                 v = self.value(node.args[0])
                 return f"(-inf < {v} < inf)"

@@ -105,7 +105,7 @@ class Intervals:
             case "table":
                 a = self.value(node.args[1])
                 return None if a is None else reckon.looked_up(node.data, a)
-            case "read" | "real" | "counter" | "finite" | "bit" | "lt" | "le" | "and" | "or" | "not":
+            case "read" | "real" | "counter" | "finite" | "bit" | "present" | "lt" | "le" | "and" | "or" | "not":
                 return None
         args = [self.value(a) for a in node.args]
         known = [a for a in args if a is not None]

@@ -34,7 +34,8 @@ class Leg:
 def legs(model: Model, box: Box, random: Random, count: int = LEGS) -> Iterator[Leg]:
     """Legs all over the box of a filter."""
     names = [*(f"x.{s}" for s in model.states), *(f"p.{name}" for name, _ in model.parameters),
-             *(f"u.{name}" for name in model.inputs), "dt"]  # fmt: skip
+             *(f"u.{name}" for name in model.inputs), "dt",
+             *(f"z.{s.name}.{name}" for s in model.sensors for name in s.inputs)]  # fmt: skip
     cube = {name: _shuffled(count, random) for name in names}
     places: dict[str, float] = {}
     for k in range(count):

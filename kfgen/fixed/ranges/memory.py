@@ -29,7 +29,7 @@ def blank(code: FilterCode) -> Memory:
             memory.arrays[f"kf.{block.name}"] = [0.0] * block.size
     spec = code.model.spec
     memory.numbers |= {f"u.{each.name}": 0.0 for each in spec.inputs}
-    memory.numbers |= {f"z.{c.name}": 0.0 for sensor in spec.measurements for c in sensor.components}
+    memory.numbers |= {f"z.{c.name}": 0.0 for sensor in spec.measurements for c in sensor.fields}
     n = len(code.model.states)
     for f in code.functions:
         for a in f.arguments:

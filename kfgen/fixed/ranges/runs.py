@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from kfgen.filters.base import FilterCode
+from kfgen.filters.steps.outputs import FUNCTION
 from kfgen.fixed.ranges.memory import Memory, blank
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
+from kfgen.spec.sensors import columns_of
 from kfgen.spec.types import Sensor
 
 Columns = Mapping[str, Sequence[float]]
@@ -25,8 +27,8 @@ def elapsed(log: Columns, k: int) -> float:
 
 
 def readings(log: Columns, sensor: Sensor, k: int) -> list[float]:
-    """What a sensor's components read in row k; NaN where nothing was."""
-    columns = [log.get(f"{sensor.name}.{c.name}") for c in sensor.components]
+    """What a sensor's components read in row k, and its own inputs; NaN where nothing was."""
+    columns = [log.get(name) for name in columns_of(sensor)]
     return [math.nan if column is None else float(column[k]) for column in columns]
 
 
@@ -72,6 +74,7 @@ class Runner:
             for place, sensor in enumerate(self.spec.measurements):
                 if (k + place) % every == 0:
                     self._limited(memory, sensor, readings(log, sensor, k), k)
+            self._tell(memory)
             if every > 1 and rows - 2 * OUTAGE < 2 * k <= rows:
                 found = self.variances(memory)
                 least = [min(pair) for pair in zip(least or found, found, strict=True)]
@@ -93,6 +96,7 @@ class Runner:
         for sensor in self.spec.measurements:
             if sensor.name in readings:
                 self._limited(memory, sensor, readings[sensor.name], k)
+        self._tell(memory)
         if k % EVERY == 0:
             self._others(memory, k)
 
@@ -161,19 +165,19 @@ class Runner:
         return step != 0
 
     def _update(self, memory: Memory, sensor: Sensor, values: Sequence[float], k: int) -> None:
-        there = [not math.isnan(v) for v in values]
-        if not any(there):
+        there = [not math.isnan(v) for v in values[: len(sensor.components)]]
+        if not any(there) or any(map(math.isnan, values[len(there) :])):
             return
         self.heard.add(sensor.name)
         name = f"update_{sensor.name}"
-        for c, v, known in zip(sensor.components, values, there, strict=True):
-            memory.numbers[f"z.{c.name}"] = v if known else 0.0
-            if known:
+        for c, v in zip(sensor.fields, values, strict=True):
+            memory.numbers[f"z.{c.name}"] = 0.0 if math.isnan(v) else v
+            if not math.isnan(v):
                 self.ranges.see(("number", name, f"z.{c.name}"), v)
         if all(there):
             if sensor.partial:
                 other = memory.copy()
-                other.numbers["mask"] = 1 + k % ((1 << len(values)) - 1)
+                other.numbers["mask"] = 1 + k % ((1 << len(there)) - 1)
                 self.program.run(f"{name}_masked", other)
             self.program.run(name, memory)
         elif sensor.partial:
@@ -192,6 +196,11 @@ class Runner:
                 continue
             for i, value in enumerate(memory.arrays[f"kf.{block.name}"]):
                 self.ranges.see(self.program.arrays.element(key, i), value)
+
+    def _tell(self, memory: Memory) -> None:
+        """The outputs, where there are some."""
+        if FUNCTION in self.names:
+            self.program.run(FUNCTION, memory)
 
     def _others(self, memory: Memory, k: int) -> None:
         """Covariance and state out and in again, on copies."""

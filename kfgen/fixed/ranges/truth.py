@@ -107,9 +107,10 @@ class Truth:
         memory.numbers["kf.steps"] += 1
         return True
 
-    def see(self, mode: int, k: int, random: Random) -> list[float]:
-        """A reading of sensor k."""
+    def see(self, mode: int, k: int, random: Random, given: Sequence[float] = ()) -> list[float]:
+        """A reading of sensor k (m,). given: the sensor's own inputs."""
         sensor = self.model.sensors[k]
+        self.memory.numbers.update({f"z.{name}": value for name, value in zip(sensor.inputs, given, strict=True)})
         m = len(sensor.h)
         arrays = self.memory.arrays
         arrays["out.z"], arrays["out.R"] = [0.0] * m, [0.0] * (m * m)

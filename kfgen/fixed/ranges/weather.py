@@ -10,10 +10,13 @@ import math
 
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.ranges import declared
-from kfgen.fixed.ranges.box import box_of
+from kfgen.fixed.ranges.box import Span, box_of
 from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.truth import Truth
+from kfgen.spec.sensors import columns_of
 
+Wave = tuple[float, float, list[tuple[float, float]]]
+"""The middle of an input, the size of its swing, and three periods (in steps) with their phases."""
 JITTER = 0.1
 DWELL = 30
 
@@ -42,17 +45,17 @@ class Weather:
         model, truth = self.model, self.truth
         truth.begin(random)
         numbers = truth.memory.numbers
-        names = [[f"{s.name}.{c.name}" for c in s.spec.components] for s in model.sensors]
+        names = [columns_of(s.spec) for s in model.sensors]
         columns: dict[str, list[float]] = {c: [] for c in ("t", *model.inputs, *(c for each in names for c in each))}
-        inputs = [self._input(i, random) for i in range(len(model.inputs))]
+        inputs = [self._input(self.box.inputs.get(name), random) for name in model.inputs]
+        own = [[self._input(self.box.readings.get((s.name, name)), random) for name in s.inputs] for s in model.sensors]
         mode, left = first, self._dwell(random)
         for k in range(rows):
             if left == 0:
                 mode, left = (mode + 1) % self.modes, self._dwell(random)
             left -= 1
-            for name, (middle, amplitude, waves) in zip(model.inputs, inputs, strict=True):
-                drive = sum(math.sin(2 * math.pi * k / period + phase) for period, phase in waves) / len(waves)
-                numbers[f"u.{name}"] = middle + amplitude * drive
+            for name, wave in zip(model.inputs, inputs, strict=True):
+                numbers[f"u.{name}"] = _at(wave, k)
             if k or not self.run_time:
                 dt = self.nominal
                 if self.run_time:
@@ -63,7 +66,8 @@ class Weather:
             for name in model.inputs:
                 columns[name].append(numbers[f"u.{name}"])
             for i, each in enumerate(names):
-                for name, z in zip(each, truth.see(mode, i, reading), strict=True):
+                given = [_at(wave, k) for wave in own[i]]
+                for name, z in zip(each, [*truth.see(mode, i, reading, given), *given], strict=True):
                     columns[name].append(z)
         return columns, rows
 
@@ -84,9 +88,15 @@ class Weather:
         dt = dt if low is None else max(dt, float(low))
         return dt if high is None else min(dt, float(high))
 
-    def _input(self, i: int, random: Random) -> tuple[float, float, list[tuple[float, float]]]:
-        """The middle of an input, the size of its swing, and three periods (in steps) with their phases."""
-        span = self.box.inputs.get(self.spec.inputs[i].name)
+    def _input(self, span: Span | None, random: Random) -> Wave:
+        """Of an input of that range."""
         middle, amplitude = (0.0, 1.0) if span is None else ((span[0] + span[1]) / 2, (span[1] - span[0]) / 8)
         waves = [(25.0 * 10 ** random.random(), 2 * math.pi * random.random()) for _ in range(3)]
         return middle, amplitude, waves
+
+
+def _at(wave: Wave, k: int) -> float:
+    """An input in row k."""
+    middle, amplitude, waves = wave
+    drive = sum(math.sin(2 * math.pi * k / period + phase) for period, phase in waves) / len(waves)
+    return middle + amplitude * drive

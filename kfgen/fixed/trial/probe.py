@@ -79,7 +79,7 @@ class Probe:
 
     def read(self, sensor: Sensor, values: Sequence[float]) -> None:
         """Give a reading."""
-        for c, v in zip(sensor.components, values, strict=True):
+        for c, v in zip(sensor.fields, values, strict=True):
             self.give(("number", f"update_{sensor.name}", f"z.{c.name}"), f"z.{c.name}", v)
 
     def call(self, function: str) -> None:

@@ -10,7 +10,7 @@ from kfgen.errors import Place
 from kfgen.spec.builders.values import Values
 from kfgen.spec.raw import Fields, Word, path_text
 from kfgen.spec.tree import Expression, Number
-from kfgen.spec.types import Adaptive, Filter, Matrix, Robust, SigmaPoints, State
+from kfgen.spec.types import Adaptive, Filter, Matrix, Robust, SigmaPoints
 
 
 class FilterBuilder:
@@ -20,7 +20,8 @@ class FilterBuilder:
         self.values = values
         self.problems = values.problems
 
-    def filter(self, f: Any, states: tuple[State, ...]) -> Filter:
+    def filter(self, f: Any, states: tuple[str, ...]) -> Filter:
+        """states: the coordinates of the error."""
         if not isinstance(f, Fields):
             f = Fields(Place(self.problems.file))
         kind, covariance = f.get("type", "ekf"), f.get("covariance", "ud")
@@ -146,10 +147,10 @@ class FilterBuilder:
         return Adaptive(a.get("probability"), a.get("chi2"))
 
     @staticmethod
-    def by_state(written: Any, states: tuple[State, ...]) -> Mapping[str, Expression]:
+    def by_state(written: Any, states: tuple[str, ...]) -> Mapping[str, Expression]:
         """A single number is spread over the states."""
         if isinstance(written, Expression):
-            return {state.name: written for state in states}
+            return dict.fromkeys(states, written)
         if isinstance(written, Fields):
             return {name: value for name, value in written.values.items() if value is not None}
         return {}

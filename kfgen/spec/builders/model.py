@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 from kfgen.spec.builders.filter import FilterBuilder
 from kfgen.spec.builders.values import Values
 from kfgen.spec.raw import Fields, Word, entries, limits, matrix
-from kfgen.spec.tree import names
-from kfgen.spec.types import Component, Covariance, Definition, Dynamics, Gate, Noise, Sensor, State
+from kfgen.spec.shaping.vectors import RawRotation
+from kfgen.spec.tree import Expression, Number, names
+from kfgen.spec.types import (
+    Component,
+    Covariance,
+    Definition,
+    Dynamics,
+    Gate,
+    Input,
+    Matrix,
+    Noise,
+    Rotation,
+    Sensor,
+    State,
+)
 
 
 class ModelBuilder:
@@ -22,11 +38,13 @@ class ModelBuilder:
         found = []
         for name, f in entries(written):
             kind, period = self.values.kind(f)
+            if kind == "quaternion":
+                self.excluded(name, f, ("bounds",))
             found.append(
                 State(
                     name,
                     self.values.formula(f, "init"),
-                    self.values.variance(f, covered),
+                    None if kind == "quaternion" else self.values.variance(f, covered),
                     f.get("unit", ""),
                     limits(f, "range"),
                     kind,
@@ -38,9 +56,37 @@ class ModelBuilder:
             )
         return tuple(found)
 
-    def definitions(self, written: Any) -> tuple[Definition, ...]:
+    def excluded(self, name: str, f: Fields, keys: tuple[str, ...]) -> None:
+        """Keys that mean nothing for a quaternion."""
+        for key in keys:
+            if key in f:
+                text = f"`{key}` does not go with a quaternion: its four numbers have no limits of their own"
+                self.problems.add(f.at(key), text, "bound a number that you derive from it, or leave it out")
+
+    def rotations(self, raw: Iterable[RawRotation], covered: bool) -> tuple[Rotation, ...]:
+        """The quaternions among states or components, with the variances of their errors."""
+        found = []
+        for rotation in raw:
+            f = rotation.fields
+            variances = [self.values.variance(each, covered) for each in rotation.entries]
+            w, x, y, z = rotation.parts
+            found.append(
+                Rotation(
+                    rotation.name,
+                    (w, x, y, z),
+                    rotation.errors,
+                    f.get("error", "body"),
+                    f.get("reset", True),
+                    (variances[0], variances[1], variances[2]),
+                    f.place,
+                )
+            )
+        return tuple(found)
+
+    def definitions(self, written: Any, hidden: tuple[Definition, ...] = ()) -> tuple[Definition, ...]:
         """In an order in which each uses only those before it; a cycle is reported once."""
         found = {name: Definition(name, expression) for name, expression in entries(written)}
+        found |= {definition.name: definition for definition in hidden}
         order: list[Definition] = []
         state: dict[str, int] = {}  # 1: on the way, 2: done
 
@@ -94,6 +140,28 @@ class ModelBuilder:
             found.append(Noise(name, variance, density, f.get("unit", ""), f.get("doc", ""), f.place))
         return tuple(found)
 
+    def blocks(
+        self, f: Fields, key: str, names: tuple[str, ...], variances: Iterable[Expression | None], kind: str = "blocks"
+    ) -> Matrix | None:
+        """A full covariance: as it is written, or of variances among which vectors have a matrix."""
+        blocks = f.get(kind, {})
+        if key in f or not blocks:
+            return matrix(f.get(key))
+        zero = Expression(Number(Fraction(0)), "0", f.place)
+        index = {name: i for i, name in enumerate(names)}
+        rows = [[zero] * len(names) for _ in names]
+        for i, variance in enumerate(variances):
+            rows[i][i] = variance or zero
+        for first, block in blocks.items():
+            for i, row in enumerate(block):
+                for j, entry in enumerate(row):
+                    rows[index[first] + i][index[first] + j] = entry
+        return tuple(map(tuple, rows))
+
+    def noise_covariance(self, f: Fields, noise: tuple[Noise, ...]) -> Matrix | None:
+        names, variances = tuple(n.name for n in noise), (n.variance for n in noise)
+        return self.blocks(f, "noise_covariance", names, variances, "noise blocks")
+
     def dynamics(self, f: Any) -> Dynamics:
         if not isinstance(f, Fields):
             return Dynamics()
@@ -112,22 +180,40 @@ class ModelBuilder:
 
     def sensor(self, name: str, f: Fields) -> Sensor:
         noise = self.noises(f.get("noise"), "noise_covariance" in f, densities=False)
-        self.values.both(f, "R", f.get("z"))
+        self.values.both(f, "R", f.get("z"), f.get("rotations", ()))
         self.values.both(f, "noise_covariance", f.get("noise"))
         components = tuple(self.component(n, c, "R" in f, "noise" in f) for n, c in entries(f.get("z")))
+        rotations = self.rotations(f.get("rotations", ()), "R" in f)
         gate = f.get("gate")
-        return Sensor(
+        sensor = Sensor(
             name,
             components,
-            matrix(f.get("R")),
+            None,
             noise,
-            matrix(f.get("noise_covariance")),
+            self.noise_covariance(f, noise),
             self.gate(gate) if isinstance(gate, Fields) else None,
             f.get("partial", False),
             f.get("rate"),
             self.own(f),
+            self.inputs(f.get("inputs")),
+            f.get("groups", ()),
+            rotations,
             f.get("doc", ""),
             f.place,
+        )
+        return replace(sensor, R=self.blocks(f, "R", sensor.errors, self.variances(sensor)))
+
+    @staticmethod
+    def variances(sensor: Sensor) -> list[Expression | None]:
+        """Of each coordinate of the innovation."""
+        known = {component.name: component.variance for component in sensor.components}
+        known |= {e: v for r in sensor.rotations for e, v in zip(r.errors, r.variances, strict=True)}
+        return [known[name] for name in sensor.errors]
+
+    def inputs(self, written: Any) -> tuple[Input, ...]:
+        return tuple(
+            Input(name, f.get("unit", ""), limits(f, "range"), f.get("doc", ""), f.place)
+            for name, f in entries(written)
         )
 
     def own(self, f: Fields) -> dict[str, Any]:
@@ -154,7 +240,8 @@ class ModelBuilder:
 
     def component(self, name: str, f: Fields, covered: bool, noisy: bool) -> Component:
         kind, period = self.values.kind(f)
-        variance = self.values.variance(f, covered, needed=not noisy)
+        rotation = kind == "quaternion"  # its variances are those of its error
+        variance = None if rotation else self.values.variance(f, covered, needed=not noisy)
         if "residual" in f and kind != "real":
             self.problems.add(f.places["residual"], "`kind` wraps the residual already", "remove one of them")
         return Component(

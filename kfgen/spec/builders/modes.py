@@ -10,15 +10,19 @@ from kfgen.spec.builders.model import ModelBuilder
 from kfgen.spec.builders.values import Values
 from kfgen.spec.problems import SHARED_STATES, short
 from kfgen.spec.raw import Fields, entries, matrix
+from kfgen.spec.shaping.shaper import Shaper
+from kfgen.spec.shaping.vectors import RawRotation
 from kfgen.spec.tree import Expression, Number
-from kfgen.spec.types import Imm, Mode, Spec, State
+from kfgen.spec.types import Definition, Imm, Mode, Rotation, Spec, State
 
 
 class ModesBuilder:
     """Builds the modes of a bank; `top` is what they fall back on."""
 
-    def __init__(self, values: Values, model: ModelBuilder, filters: FilterBuilder, top: Fields) -> None:
-        self.values, self.model, self.filters = values, model, filters
+    def __init__(
+        self, values: Values, model: ModelBuilder, filters: FilterBuilder, top: Fields, shaper: Shaper
+    ) -> None:
+        self.values, self.model, self.filters, self.shaper = values, model, filters, shaper
         self.problems = values.problems
         self.top = top
 
@@ -36,7 +40,8 @@ class ModesBuilder:
     def mode(self, spec: Spec, name: str, f: Fields) -> Mode:
         """A mode's key replaces the top-level key whole."""
         states = self.states(spec, f)
-        self.values.both(f, "P0", f.get("states"))
+        raw = self.shaper.model.rotations.get((*f.path, "states"), [])
+        self.values.both(f, "P0", f.get("states"), raw)
         self.values.both(f, "noise_covariance", f.get("noise"))
         own_covariance = "P0" in f or "covariances" in f or "states" in f
         if "P0" in f and "covariances" in f:
@@ -51,20 +56,38 @@ class ModesBuilder:
                 self.problems.add(
                     f.place, f"the mode {short(name)} has no `{key}`", f"write `{key}` in it or at the top"
                 )
+        noise = self.model.noises(f.get("noise"), covered) if "noise" in f else spec.noise
         return Mode(
             name,
             states,
             covariances,
             P0,
-            self.model.noises(f.get("noise"), covered) if "noise" in f else spec.noise,
-            matrix(f.get("noise_covariance"))
-            if "noise_covariance" in f
-            else (None if "noise" in f else spec.noise_covariance),
-            self.model.definitions(f.get("let")) if "let" in f else spec.let,
+            noise,
+            self.model.noise_covariance(f, noise)
+            if "noise_covariance" in f or "noise" in f
+            else spec.noise_covariance,
+            self.model.definitions(f.get("let") if "let" in f else self.top.get("let"), self.hidden(name, f)),
             self.model.dynamics(f.get("dynamics")) if "dynamics" in f else spec.dynamics,
             self.model.sensors(f.get("measurements")) if "measurements" in f else spec.measurements,
-            self.filters.filter(f.get("filter"), spec.states) if "filter" in f else spec.filter,
+            self.filters.filter(f.get("filter"), spec.errors) if "filter" in f else spec.filter,
             f.place,
+            self.rotations(spec, f, raw),
+        )
+
+    def hidden(self, name: str, f: Fields) -> tuple[Definition, ...]:
+        """The definitions that no user has written, of what this mode has or inherits."""
+        inherited = [(key,) for key in self.top.values if key not in f]
+        return self.shaper.hidden([*inherited, *(("imm", "modes", name, key) for key in f.values)])
+
+    def rotations(self, spec: Spec, f: Fields, raw: list[RawRotation]) -> tuple[Rotation, ...]:
+        """The top's quaternions with this mode's variances."""
+        if "states" not in f:
+            bare = tuple(replace(rotation, variances=(None, None, None)) for rotation in spec.rotations)
+            return bare if "P0" in f else spec.rotations
+        own = {rotation.name: rotation for rotation in self.model.rotations(raw, "P0" in f)}
+        return tuple(
+            replace(r, variances=own[r.name].variances, place=own[r.name].place) if r.name in own else r
+            for r in spec.rotations
         )
 
     def states(self, spec: Spec, f: Fields) -> tuple[State, ...]:
@@ -87,7 +110,8 @@ class ModesBuilder:
                     )
                 found.append(replace(state, variance=self.values.bad(state.place)))
                 continue
-            variance = self.values.variance(fields, "P0" in f)
+            rotation = state.kind == "quaternion"
+            variance = None if rotation else self.values.variance(fields, "P0" in f)
             found.append(
                 replace(state, init=self.values.formula(fields, "init"), variance=variance, place=fields.place)
             )

@@ -10,8 +10,9 @@ from kfgen.spec.builders.values import Values
 from kfgen.spec.constants import keep
 from kfgen.spec.problems import short
 from kfgen.spec.raw import Fields, Word, entries, limits, matrix
+from kfgen.spec.shaping.shaper import Shaper
 from kfgen.spec.tree import Expression
-from kfgen.spec.types import Code, Constant, Fixed, History, Initialize, Input, Parameter, Spec, Step
+from kfgen.spec.types import Code, Constant, Fixed, History, Initialize, Output, Parameter, Spec, Step, error_names
 from kfgen.spec.walk import Walker
 
 
@@ -21,7 +22,8 @@ class Builder:
     def __init__(self, walker: Walker, top: Fields) -> None:
         self.walker = walker
         self.problems = walker.problems
-        self.top = top
+        self.shaper = Shaper(walker, top)
+        self.top = self.shaper.flat()
         self.values = Values(walker)
         self.model = ModelBuilder(self.values)
         self.filters = FilterBuilder(self.values)
@@ -30,7 +32,11 @@ class Builder:
         top = self.top
         constants = self.constants()
         states = self.model.states(top.get("states"), covered="P0" in top)
-        self.values.both(top, "P0", top.get("states"))
+        raw = self.shaper.model.rotations.get(("states",), [])
+        rotations = self.model.rotations(raw, covered="P0" in top)
+        errors = error_names((state.name for state in states), rotations)
+        noise = self.model.noises(top.get("noise"), "noise_covariance" in top)
+        self.values.both(top, "P0", top.get("states"), raw)
         self.values.both(top, "noise_covariance", top.get("noise"))
         imm = top.get("imm")
         spec = Spec(
@@ -46,16 +52,19 @@ class Builder:
             covariances=self.model.covariances(top),
             P0=matrix(top.get("P0")),
             initialize=self.initialize(),
-            inputs=self.inputs(),
-            noise=self.model.noises(top.get("noise"), "noise_covariance" in top),
-            noise_covariance=matrix(top.get("noise_covariance")),
-            let=self.model.definitions(top.get("let")),
+            inputs=self.model.inputs(top.get("inputs")),
+            noise=noise,
+            noise_covariance=self.model.noise_covariance(top, noise),
+            let=self.model.definitions(top.get("let"), self.shaper.hidden((key,) for key in top.values)),
             dynamics=self.model.dynamics(top.get("dynamics")),
             measurements=self.model.sensors(top.get("measurements")),
-            filter=self.filters.filter(top.get("filter"), states),
+            filter=self.filters.filter(top.get("filter"), errors),
             fixed=self.fixed(),
             code=self.code(),
             history=self.history(),
+            groups=tuple(self.shaper.groups.values()),
+            rotations=rotations,
+            outputs=self.outputs(),
             advice=tuple(name for name in top.get("advice", ()) if name is not None),
             place=top.place,
             places=dict(top.places),
@@ -64,7 +73,7 @@ class Builder:
             self.problems.add(top.at("covariances"), "`P0` is given too", "write the covariances into P0")
         if not isinstance(imm, Fields):
             return spec
-        return ModesBuilder(self.values, self.model, self.filters, top).with_modes(spec, imm)
+        return ModesBuilder(self.values, self.model, self.filters, top, self.shaper).with_modes(spec, imm)
 
     def scalar(self) -> str:
         text = self.top.get("scalar", FLOAT)
@@ -95,19 +104,20 @@ class Builder:
             return Step(written)
         return Step(self.values.bad(self.top.at("dt"))) if "dt" in self.top else None
 
-    def inputs(self) -> tuple[Input, ...]:
+    def outputs(self) -> tuple[Output, ...]:
         return tuple(
-            Input(name, f.get("unit", ""), limits(f, "range"), f.get("doc", ""), f.place)
-            for name, f in entries(self.top.get("inputs"))
+            Output(name, self.values.formula(f, "value"), f.get("unit", ""), f.get("doc", ""), f.place)
+            for name, f in entries(self.top.get("outputs"))
         )
 
-    def initialize(self) -> Initialize | None:
-        written = self.top.get("initialize")
-        if not isinstance(written, Fields):
-            return None
-        sensor = written.get("from")
-        states = {n: w.text for n, w in entries(written.get("states")) if isinstance(w, Word)}
-        return Initialize(sensor.text if isinstance(sensor, Word) else "", states)
+    def initialize(self) -> tuple[Initialize, ...]:
+        found = []
+        for rule in self.top.get("initialize", ()):
+            sensor = rule.get("from")
+            states, variance = (dict(entries(rule.get(key))) for key in ("states", "var"))
+            name = sensor.text if isinstance(sensor, Word) else ""
+            found.append(Initialize(name, states, variance, rule.get("let", ()), rule.place, rule.get("waits", False)))
+        return tuple(found)
 
     # --- options
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
@@ -10,6 +11,7 @@ from kfgen.spec.constants import NotConstant, value
 from kfgen.spec.operations import NoValue, Value
 from kfgen.spec.problems import short
 from kfgen.spec.raw import BAD, Fields, entries, path_text
+from kfgen.spec.shaping.vectors import RawRotation
 from kfgen.spec.tree import Call, Expression, Name, Number
 from kfgen.spec.walk import Walker
 
@@ -43,6 +45,8 @@ class Values:
         written = f.get("kind", "real")
         if isinstance(written, Fields):
             return "periodic", self.formula(written, "periodic")
+        if written == "quaternion":
+            return "quaternion", None
         if written != "angle":
             return "real", None
         unit = f.get("unit")
@@ -75,15 +79,16 @@ class Values:
             return expression
         return Expression(Call("pow", (expression.tree, Number(Fraction(2)))), expression.text, expression.place)
 
-    def both(self, holder: Fields, matrix_key: str, written: Any) -> None:
+    def both(self, holder: Fields, matrix_key: str, written: Any, rotations: Iterable[RawRotation] = ()) -> None:
         """A full covariance beside single variances: one mistake, whoever has them."""
         if matrix_key not in holder:
             return
         more = ("density", "root_density")
-        given = [(n, key) for n, f in entries(written) for key in ("std", "var", *more) if key in f]
+        listed = [*entries(written), *((r.name, r.fields) for r in rotations)]
+        given = [(n, key) for n, f in listed for key in ("std", "var", *more) if key in f]
         if given:
-            listed = ", ".join(f"`{key}` of {short(name)}" for name, key in given[:6])
-            text = f"`{matrix_key}` is given, and {listed} too"
+            words = ", ".join(f"`{key}` of {short(name)}" for name, key in given[:6])
+            text = f"`{matrix_key}` is given, and {words} too"
             self.problems.add(holder.at(matrix_key), text, "give the variances in one of the two")
 
     def mistaken(self, f: Fields) -> bool:

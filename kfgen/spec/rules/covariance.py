@@ -6,12 +6,12 @@ import random
 from fractions import Fraction
 
 from kfgen.errors import Place
+from kfgen.spec.contexts import Context
 from kfgen.spec.matrices import close, is_semidefinite, smallest_eigenvalue, worst_pair
 from kfgen.spec.operations import Value, apply
 from kfgen.spec.problems import short
 from kfgen.spec.raw import BAD
 from kfgen.spec.rules.facts import Facts, Model, show
-from kfgen.spec.scopes import Context
 from kfgen.spec.tree import Call, Expression, Number
 from kfgen.spec.types import Matrix, Noise
 

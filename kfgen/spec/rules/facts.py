@@ -10,10 +10,11 @@ import mpmath
 
 from kfgen.errors import Place
 from kfgen.spec.constants import NotConstant, environment_of, keep, value, with_parameters
+from kfgen.spec.contexts import Context
 from kfgen.spec.operations import NoValue, Value, less, real
 from kfgen.spec.problems import Problems
 from kfgen.spec.raw import BAD
-from kfgen.spec.scopes import Context, Scopes
+from kfgen.spec.scopes import Scopes
 from kfgen.spec.tree import Expression, Tree
 from kfgen.spec.types import Covariance, Dynamics, Filter, Matrix, Noise, Sensor, Spec, State
 from kfgen.spec.walk import Walker

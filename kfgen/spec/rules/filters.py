@@ -105,9 +105,7 @@ def _variables(model: Model, sensor: Sensor | None = None) -> frozenset[str]:
 def _unknown(model: Model, expression: Expression) -> bool:
     """Whether a mistake in its names has been reported, so that nothing more can be said."""
     names = model.context.uses(expression)
-    return expression.tree == BAD or any(
-        n not in model.context.kinds and n not in ("pi", "e", "dt", "t") for n in names
-    )
+    return expression.tree == BAD or any(model.context.kind_of(n) is None for n in names)
 
 
 def _known(facts: Facts, model: Model) -> dict[str, Value]:
@@ -183,7 +181,7 @@ def _constant_coefficients(
 
 def _varying(model: Model, names: frozenset[str]) -> str:
     fixed = model.context.spec.dt is not None and not model.context.spec.dt.run_time
-    kinds = {model.context.kinds.get(name, name) for name in names} - ({"dt"} if fixed else set())
+    kinds = {model.context.kind_of(name) or name for name in names} - ({"dt"} if fixed else set())
     return " and ".join(_VARYING[kind] for kind in _VARYING if kind in kinds)
 
 

@@ -56,7 +56,7 @@ def _sensor(facts: Facts, sensor: Sensor, model: Model) -> None:
         if component.h.tree == BAD or not states:
             continue
         used = model.context.uses(component.h)
-        unknown = [n for n in used if n not in model.context.kinds and n not in ("pi", "e", "dt", "t")]
+        unknown = [n for n in used if model.context.kind_of(n) is None]
         if not used & states and not unknown and not used & doubtful:
             facts.add(component.h.place, "h depends on no state, so it measures nothing", "write what is measured")
         if component.residual is not None and component.residual.tree != BAD:
@@ -71,6 +71,7 @@ def _residual(facts: Facts, residual: Expression, model: Model) -> None:
 
 
 def _initialize(facts: Facts) -> None:
-    initialize = facts.spec.initialize
-    if initialize is not None and not initialize.states and facts.empty("initialize.states"):
-        facts.add(facts.at("initialize.states"), "no state is set", "write `states: {px: x}`")
+    for initialize in facts.spec.initialize:
+        path = f"{initialize.place.path}.states"
+        if not initialize.states and facts.empty(path):
+            facts.add(facts.at(path), "no state is set", "write `states: {px: x}`")

@@ -16,6 +16,9 @@ from kfgen.spec.types import Filter, Range, Sensor
 
 _LARGEST = {FLOAT: Fraction(2) ** 128, DOUBLE: Fraction(2) ** 1024}
 
+# names of constants that mean something else: the innovation, components of sensors
+_HIDDEN = {"psi": ("e",), "initialize": ("pi", "e", "dt", "t")}
+
 
 def check(facts: Facts) -> None:
     _foldable(facts)
@@ -40,32 +43,35 @@ def _foldable(facts: Facts) -> None:
             known = facts.folded if written.scope == "folded" else facts.known(context)
             if written.scope == "psi":
                 known = {name: v for name, v in known.items() if name != "e"}
-            try:
-                number = _fold(written.expression.tree, known, psi=written.scope == "psi")
-            except NoValue as error:
-                facts.add(written.expression.place, error.message, error.hint)
-                continue
+            if written.scope == "initialize":  # components hide other names
+                known = {}
             largest = _LARGEST.get(DOUBLE if written.path[0] == "constants" else facts.spec.scalar)
-            if number is not None and largest is not None and not less(abs(number), largest):
-                text = f"the value {show(number)} is too large for {facts.spec.scalar}"
-                facts.add(written.expression.place, text, "choose other units, or `scalar: double`")
+            for part in written.parts:
+                try:
+                    number = _fold(part.tree, known, hidden=_HIDDEN.get(written.scope, ()))
+                except NoValue as error:
+                    facts.add(part.place, error.message, error.hint)
+                    continue
+                if number is not None and largest is not None and not less(abs(number), largest):
+                    text = f"the value {show(number)} is too large for {facts.spec.scalar}"
+                    facts.add(part.place, text, "choose other units, or `scalar: double`")
 
 
-def _fold(tree: Tree, known: dict[str, Value], psi: bool = False) -> Value | None:
+def _fold(tree: Tree, known: dict[str, Value], hidden: tuple[str, ...] = ()) -> Value | None:
     """The value of a tree, or None where it is not constant; NoValue where a constant part of it has none."""
     if isinstance(tree, Number):
         return tree.value
     if isinstance(tree, Name):
-        if psi and tree.name == "e":
+        if tree.name in hidden:
             return None
         return value(tree) if tree.name in ("pi", "e") else known.get(tree.name)
     if tree.op == "where":
-        return _fold_where(tree, known, psi)
+        return _fold_where(tree, known, hidden)
     if tree.op in ("lt", "le", "gt", "ge", "and", "or", "not"):
         for argument in tree.args:
-            _fold(argument, known, psi)
+            _fold(argument, known, hidden)
         return None
-    arguments = [_fold(argument, known, psi) for argument in tree.args]
+    arguments = [_fold(argument, known, hidden) for argument in tree.args]
     if tree.op == "pow" and arguments[1] is not None:
         exponent = arguments[1]
         if exponent == apply("floor", [exponent]) and abs(exponent) > MAX_EXPONENT:
@@ -82,16 +88,16 @@ def _fold(tree: Tree, known: dict[str, Value], psi: bool = False) -> Value | Non
     return apply(tree.op, arguments)
 
 
-def _fold_where(tree: Call, known: dict[str, Value], psi: bool) -> Value | None:
+def _fold_where(tree: Call, known: dict[str, Value], hidden: tuple[str, ...]) -> Value | None:
     """Only the selected branch counts; where that is not known before run time, neither is judged."""
-    _fold(tree.args[0], known, psi)
-    if psi:
+    _fold(tree.args[0], known, hidden)
+    if hidden:
         return None
     try:
         chosen = truth(tree.args[0], known)
     except NotConstant:
         return None
-    return _fold(tree.args[1] if chosen else tree.args[2], known, psi)
+    return _fold(tree.args[1] if chosen else tree.args[2], known, hidden)
 
 
 def _whole_numbers(facts: Facts) -> None:

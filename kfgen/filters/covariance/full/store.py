@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from kfgen.filters.algebra.numbers import select, sqrt
-from kfgen.filters.algebra.triangles import upper_size, upper_start
+from kfgen.filters.algebra.triangles import upper, upper_size, upper_start
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.kernels.correlations import limit
 from kfgen.filters.covariance.kernels.function import Kernels
@@ -52,6 +52,10 @@ class FullStore:
         """Store a covariance (upper triangle column by column) whose factors are known to be positive."""
         with t.loop("k", 0, upper_size(self.n)) as k:
             t.store("kf.P", k, P[k])
+
+    def isolate(self, t: Trace, place: int, variance: Value) -> None:
+        for i in range(self.n):
+            t.store("kf.P", upper(min(i, place), max(i, place)), variance if i == place else t.zero)
 
     def root_array(self, t: Trace, tolerance: Fraction, own: Array | None = None) -> Array:
         """The columns of the lower root of P, one after another. own: an array in place of the field.

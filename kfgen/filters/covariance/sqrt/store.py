@@ -13,7 +13,8 @@ from kfgen.filters.algebra.numbers import constant_root, select, sqrt
 from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.base import CONST_KF, KF, Block
 from kfgen.filters.covariance.definite import Definite
-from kfgen.filters.covariance.kernels.function import integer
+from kfgen.filters.covariance.kernels.function import Kernels, integer
+from kfgen.filters.covariance.kernels.isolate import isolate_root
 from kfgen.filters.covariance.names import entry
 from kfgen.ir.program import Argument, Function
 from kfgen.ir.schedule import schedule
@@ -112,6 +113,13 @@ class SqrtStore(Definite):
             if self.n > 1:
                 with t.loop("i", 0, j) as i:
                     t.store("kf.S", self.place(i, j), factors[upper_start(j) + i] * root)
+
+    def isolate(self, t: Trace, place: int, variance: Value) -> None:
+        if self.n == 1:
+            t.store("kf.S", 0, sqrt(variance))
+            return
+        kernel = isolate_root(Kernels(Fraction(t.smallest), frozenset()), self.n)
+        t.call(kernel, [("kf.S", 0), integer(t, self.n - 1 - place), variance])
 
     def root_array(self, t: Trace, own: Array | None = None) -> Array:
         """The columns of S, one after another. own: an array in place of the field."""

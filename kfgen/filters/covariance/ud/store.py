@@ -10,6 +10,8 @@ from kfgen.filters.algebra.numbers import assume_nonnegative, sqrt
 from kfgen.filters.algebra.triangles import strict_size, strict_start, upper_start
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.definite import Definite
+from kfgen.filters.covariance.kernels.function import Kernels, integer
+from kfgen.filters.covariance.kernels.isolate import isolate
 from kfgen.filters.covariance.names import entries, entry
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
@@ -62,6 +64,13 @@ class UDStore(Definite):
                 with t.loop("i", 0, j) as i:
                     t.store("kf.U", strict_start(j) + i, factors[upper_start(j) + i])
             t.store("kf.D", j, factors[upper_start(j) + j])
+
+    def isolate(self, t: Trace, place: int, variance: Value) -> None:
+        if self.n == 1:
+            t.store("kf.D", 0, variance)
+            return
+        kernel = isolate(Kernels(Fraction(t.smallest), frozenset()), self.n)
+        t.call(kernel, [("kf.U", 0), ("kf.D", 0), integer(t, place), variance])
 
     def root_array(self, t: Trace, own: Mapping[str, Array] | None = None) -> Array:
         """The columns of U sqrt(D), one after another. own: arrays in place of the fields."""
