@@ -101,7 +101,7 @@ def _ram(h: HistoryView, view: View, scalar: Scalar) -> int:
     step = [(size * h.per_step, align), *([inputs] if h.predict_u else []), *([(real, real)] if h.predict_dt else [])]
     step_size, step_align = _struct([*step, (1, 1)])
     own = max(4, real)  # a filter holds reals, and perhaps counters
-    whole = [(view.ram * (1 + h.kept), own), (step_size * h.ring, step_align), (8, 4)]
+    whole = [(view.ram * (1 + h.kept), own), (step_size * h.ring, step_align), (real, real), (8, 4)]
     return _struct(whole)[0]
 
 

@@ -108,7 +108,7 @@ def _files(name: str, history: bool) -> list[str]:
 
 def _load(spec: Spec, declared: Declarations, library: str, history: bool) -> NativeFilter:
     ffi = cffi.FFI()
-    ffi.cdef("\n".join([declared.text, driver.declarations(spec.name), declared.history if history else ""]))
+    ffi.cdef("\n".join([declared.text, declared.history if history else "", driver.declarations(spec.name, history)]))
     lib = ffi.dlopen(library)
     for name in (spec.name, f"{spec.name}_history") if history else (spec.name,):
         seen, compiled = ffi.sizeof(f"{name}_t"), getattr(lib, f"{name}_kfgen_size")()

@@ -13,9 +13,9 @@ from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 
 
-def declarations(name: str) -> str:
+def declarations(name: str, history: bool = False) -> str:
     """The prototypes of the driver, for cffi."""
-    return f"size_t {name}_kfgen_size(void);\n{_signature(name)};\n"
+    return f"size_t {name}_kfgen_size(void);\n{_signature(name, history)};\n"
 
 
 def source(spec: Spec, declared: Declarations, history: bool = False) -> str:
@@ -35,7 +35,7 @@ def source(spec: Spec, declared: Declarations, history: bool = False) -> str:
         )
     return _template().render(
         name=name,
-        signature=_signature(name),
+        signature=_signature(name, history),
         nx=len(spec.states),
         nu=len(spec.inputs),
         nz=sum(len(each["fields"]) for each in sensors),
@@ -52,12 +52,12 @@ def source(spec: Spec, declared: Declarations, history: bool = False) -> str:
     )
 
 
-def _signature(name: str) -> str:
-    real = f"{name}_real_t"
+def _signature(name: str, history: bool) -> str:
+    real, whole = f"{name}_real_t", f"{name}_history_t *h" if history else f"{name}_t *kf"
     return (
-        f"void {name}_kfgen_run({name}_t *kf, size_t rows, const uint8_t *step, const {real} *dt, "
-        f"const {real} *u, const uint32_t *mask, const {real} *z, {real} *x, {real} *rest, {real} *var, {real} *nis, "
-        f"{real} *mu, {real} *out, {real} *deviation, uint8_t *told, uint32_t *status)"
+        f"void {name}_kfgen_run({whole}, size_t rows, const uint8_t *step, const {real} *dt, "
+        f"const {real} *u, const uint32_t *mask, const uint32_t *age, const {real} *z, {real} *x, {real} *rest, "
+        f"{real} *var, {real} *nis, {real} *mu, {real} *out, {real} *deviation, uint8_t *told, uint32_t *status)"
     )
 
 

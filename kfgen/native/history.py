@@ -23,6 +23,12 @@ class PastStruct(Struct):
         self.data = ffi.addressof(self.past, "kf")
         self.age = 0  # of the next measurement
 
+    has_past = True
+
+    @property
+    def whole(self) -> Any:
+        return self.past
+
     def copy(self) -> PastStruct:
         other = object.__new__(PastStruct)
         other.__dict__.update(self.__dict__)

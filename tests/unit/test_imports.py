@@ -31,6 +31,7 @@ ALLOWED = {
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
     "logs": SPEC | {"files"},
+    "late": SPEC | {"logs"},
     "reference": {"errors", "spec"},
     # from a spec to C
     "ir": {"errors"},
@@ -46,7 +47,7 @@ ALLOWED = {
     "advice": SPEC | {"generate", "reference", "simulate"},
     # the compiled filter, and what uses it
     "simulate": SPEC | {"geometry", "logs", "reference"},
-    "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
+    "native": SPEC | {"emit", "files", "generate", "late", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC
     | {"advice", "generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
@@ -56,7 +57,7 @@ ALLOWED = {
     | {"status"},
     "layouts": {"emit"},
     "commands": SPEC
-    | {"advice", "check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference"}
+    | {"advice", "check", "cost", "files", "generate", "late", "layouts", "logs", "native", "override", "plot", "reference"}
     | {"seal", "selftest", "simulate", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
