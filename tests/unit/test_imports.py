@@ -57,8 +57,8 @@ ALLOWED = {
     | {"status"},
     "layouts": {"emit"},
     "commands": SPEC
-    | {"advice", "check", "cost", "files", "generate", "late", "layouts", "logs", "native", "override", "plot", "reference"}
-    | {"seal", "selftest", "simulate", "status"},
+    | {"advice", "check", "cost", "files", "generate", "late", "layouts", "logs", "native", "override", "plot"}
+    | {"reference", "seal", "selftest", "simulate", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
     "__main__": {"cli"},
