@@ -212,13 +212,11 @@ def _calls(spec: Spec, work: Plan, row: int, random: np.random.Generator) -> lis
 def _rounded(kf: NativeFilter, work: Plan) -> Plan:
     """The same numbers as the scalar type carries them."""
     scalar, units = kf.struct.value, kf.struct.units
-    return Plan(
-        work.t,
-        work.step,
-        scalar.to_physical(scalar.to_raw(work.dt, units.dt), units.dt),
-        scalar.to_physical(scalar.to_raw(work.u, units.u), units.u),
-        work.mask,
-        scalar.to_physical(scalar.to_raw(work.z, units.readings), units.readings),
+    return replace(
+        work,
+        dt=scalar.to_physical(scalar.to_raw(work.dt, units.dt), units.dt),
+        u=scalar.to_physical(scalar.to_raw(work.u, units.u), units.u),
+        z=scalar.to_physical(scalar.to_raw(work.z, units.readings), units.readings),
     )
 
 

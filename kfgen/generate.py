@@ -10,7 +10,8 @@ from pathlib import Path
 from kfgen.budgets import Prediction, exceeded, predict
 from kfgen.emit.data import View
 from kfgen.emit.declarations import Declarations, declarations
-from kfgen.emit.render import render
+from kfgen.emit.history import HistoryView, history_view
+from kfgen.emit.render import render, render_history
 from kfgen.emit.view import make_view
 from kfgen.errors import KfgenError, SpecError
 from kfgen.filters.base import FilterCode
@@ -48,6 +49,7 @@ class Generated:
     code: FilterCode
     view: View
     fixed: FixedFilter | None = None
+    history: HistoryView | None = None
 
     @property
     def spec(self) -> Spec:
@@ -57,7 +59,7 @@ class Generated:
     @cached_property
     def declarations(self) -> Declarations:
         """What the header declares."""
-        return declarations(self.view)
+        return declarations(self.view, self.history)
 
 
 def build(spec: Spec, scalar: str | None = None, log: Log | None = None, *, judge: bool = True) -> Generated:
@@ -88,12 +90,21 @@ def _built(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Genera
             place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
         ) from None
     prediction = _predicted(spec, code, SCALARS[spec.scalar], view, judge)
-    return Generated(_rendered(view), replace(summary(code, view), prediction=prediction), code, view)
+    told = replace(summary(code, view), prediction=prediction)
+    history = history_view(code, view, SCALARS[spec.scalar])
+    return Generated(_rendered(view, history), _with_past(told, history), code, view, None, history)
 
 
-def _rendered(view: View) -> dict[str, str]:
+def _rendered(view: View, history: HistoryView | None) -> dict[str, str]:
     """The files, each with the hash of its body."""
-    return {name: sealed(name, text) for name, text in render(view).items()}
+    texts = render(view) if history is None else render(view) | render_history(view, history)
+    return {name: sealed(name, text) for name, text in texts.items()}
+
+
+def _with_past(told: Summary, history: HistoryView | None) -> Summary:
+    if history is not None:
+        told.notes.append(f"history of {history.steps} steps: {history.ram} bytes of RAM, the filter's own in it")
+    return told
 
 
 def _predicted(spec: Spec, code: FilterCode, scalar: Scalar, view: View, judge: bool) -> Prediction:
@@ -117,7 +128,8 @@ def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Genera
         told.notes.append(UNROLLED)
     told.notes.extend(result.told)
     told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
-    return Generated(_rendered(view), told, result.code, view, result)
+    history = history_view(result.code, view, scalar)
+    return Generated(_rendered(view, history), _with_past(told, history), result.code, view, result, history)
 
 
 def _named(spec: Spec) -> Log | None:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kfgen.errors import KfgenError
 from kfgen.files import writing
-from kfgen.spec.sensors import columns_of
+from kfgen.spec.sensors import columns_of, late_columns
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -96,7 +96,8 @@ def read(path: str | os.PathLike[str], spec: Spec) -> Log:
     _require(header, needed, source)
     if not rows:
         raise KfgenError(f"{source}: the log has a header but no rows")
-    wanted = [name for name in header if name in needed or name == "t" or name.startswith("true.")]
+    known = {*needed, *late_columns(spec), "t"}
+    wanted = [name for name in header if name in known or name.startswith("true.")]
     columns = {name: _column(name, header.index(name), rows, lines, source) for name in wanted}
     ignored = tuple(name for name in header if name not in columns)
     if "t" in columns:

@@ -31,6 +31,7 @@ class Status(IntFlag):
     NULL_ARGUMENT = 0x100, "a pointer is NULL"
     NOT_FINITE = 0x200, "an argument or a value of the model is NaN or infinite"
     NOT_POSITIVE = 0x400, "a variance or dt is not positive"
+    TOO_OLD = 0x800, "the measurement is older than the history, or its step is full"
 
 
 ERROR = 0x100

@@ -63,6 +63,9 @@ def run(
     dt: exit status 2 where it falls, its usual step is not dt (5 %), or over 1 % of
     its steps exceed 1.5 dt. Exit status 1 where each update failed.
 
+    A filter with a `history` takes late measurements: the column <sensor>.age (s), or <sensor>.time (s, when it was
+    made), tells of them; rows stand in the order of arrival.
+
     The result has the columns t, x.<state>, var.<state>, nis.<sensor>, status, mu.<mode>, out.<output>,
     out_std.<output>. It goes to OUT.csv, or to stdout if neither -o nor --plot is given.
     """
@@ -80,10 +83,12 @@ def run(
         click.echo(f"kfgen: ignored columns of {log}: {logs.listed(data.ignored)}", err=True)
     if fixed_step(loaded) and not any_rate:
         logs.check_rate(data, fixed_step(loaded))
-    kf = native.compile(loaded, log=read_ranges(ranges, loaded))
+    kf = native.compile(loaded, log=read_ranges(ranges, loaded), history=loaded.history is not None)
     with progress(data.rows, data.rows >= LONG) as advance:
         result = kf.run(data, lambda done, rows: advance(done, "running"))
     _report(result)
+    for line in _told_late(loaded, result):
+        click.echo(f"kfgen: {line}", err=True)
     if out is not None:
         logs.write(out, columns(loaded, result))
     elif plot is None:
@@ -125,3 +130,12 @@ def _report(result: RunResult) -> None:
         return
     for function, kind, text in found:
         click.echo(f"kfgen: {function}: {kind} {text} in {rows} rows", err=True)
+
+
+def _told_late(spec: Spec, result: RunResult) -> list[str]:
+    """What late measurements cost: predictions, with the updates after them, that were made again."""
+    more = (spec.history.keep - 1) / 2 if spec.history is not None else 0.0
+    return [
+        f"{name}: {count} late measurements, {mean + more:.3g} predictions repeated for each on average, at most {most}"
+        for name, (count, mean, most) in result.late().items()
+    ]

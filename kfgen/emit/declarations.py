@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from kfgen.emit.data import View
+from kfgen.emit.history import HistoryView
 from kfgen.emit.render import render_c
 
 
@@ -16,7 +17,7 @@ class Declarations:
     prefix: of all names. real: the C type of its numbers: `float`, `double` or `int32_t`. text: its types and
     functions as C without a directive, which is what cffi reads. functions: name without the prefix -> the
     names of its arguments in order. Fixed point: fraction_bits, and units, quantity (`PX`, `GNSS_X`) -> the
-    physical value of raw 1.
+    physical value of raw 1. history: what its header declares, where there is one.
     """
 
     prefix: str
@@ -25,6 +26,7 @@ class Declarations:
     functions: Mapping[str, tuple[str, ...]]
     fraction_bits: int | None = None
     units: Mapping[str, float] = field(default_factory=dict)
+    history: str = ""
 
     def has(self, function: str) -> bool:
         return function in self.functions
@@ -34,7 +36,7 @@ class Declarations:
         return argument in self.functions.get(function, ())
 
 
-def declarations(view: View) -> Declarations:
+def declarations(view: View, history: HistoryView | None = None) -> Declarations:
     """What the header of a view declares."""
     return Declarations(
         view.name,
@@ -43,4 +45,5 @@ def declarations(view: View) -> Declarations:
         {function.name: function.arguments for function in view.functions if not function.private},
         view.scalar.fraction_bits,
         {unit.name: float(unit.value) for unit in view.units},
+        "" if history is None else render_c("c/history_declarations.j2", v=view, h=history),
     )

@@ -70,8 +70,10 @@ def _behind(comment: str, blanks: int) -> str:
 
 
 def statuses() -> Iterator[Named]:
-    """The bits of the status, and where the errors begin."""
+    """The bits of the status, and where the errors begin; TOO_OLD is one of the history's header."""
     for name, status in Status.__members__.items():
+        if status == Status.TOO_OLD:
+            continue
         if status == ERROR:
             yield _status("ERROR", ERROR, "errors from here up")
         yield _status(name, status, status.doc)

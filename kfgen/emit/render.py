@@ -11,6 +11,7 @@ from typing import Any
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from kfgen.emit.data import View
+from kfgen.emit.history import HistoryView
 from kfgen.emit.text import WIDTH
 
 _WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
@@ -43,6 +44,13 @@ def _environment() -> Environment:
 def render(view: View) -> dict[str, str]:
     """File name -> text."""
     return {f"{view.name}.{suffix}": render_c(f"c/filter.{suffix}.j2", v=view) for suffix in ("h", "c")}
+
+
+def render_history(view: View, history: HistoryView) -> dict[str, str]:
+    """File name -> text of the history around a filter."""
+    return {
+        f"{view.name}_history.{suffix}": render_c(f"c/history.{suffix}.j2", v=view, h=history) for suffix in ("h", "c")
+    }
 
 
 def render_c(template: str, **names: Any) -> str:

@@ -13,13 +13,13 @@ from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
 
 
-def declarations(name: str) -> str:
+def declarations(name: str, history: bool = False) -> str:
     """The prototypes of the driver, for cffi."""
-    return f"size_t {name}_kfgen_size(void);\n{_signature(name)};\n"
+    return f"size_t {name}_kfgen_size(void);\n{_signature(name, history)};\n"
 
 
-def source(spec: Spec, declared: Declarations) -> str:
-    """The driver's C text for a filter; its functions are called with what they take."""
+def source(spec: Spec, declared: Declarations, history: bool = False) -> str:
+    """The driver's C text for a filter, with its past or without; its functions are called with what they take."""
     name = spec.name
     sensors: list[dict[str, Any]] = []
     for sensor, place in readings_of(spec):
@@ -35,7 +35,7 @@ def source(spec: Spec, declared: Declarations) -> str:
         )
     return _template().render(
         name=name,
-        signature=_signature(name),
+        signature=_signature(name, history),
         nx=len(spec.states),
         ne=len(spec.errors),
         nu=len(spec.inputs),
@@ -49,15 +49,16 @@ def source(spec: Spec, declared: Declarations) -> str:
         modes=len(spec.imm.modes) if spec.imm else 0,
         outputs=[each.name for each in spec.outputs],
         compensated=spec.code.compensated,
+        history=history,
     )
 
 
-def _signature(name: str) -> str:
-    real = f"{name}_real_t"
+def _signature(name: str, history: bool) -> str:
+    real, whole = f"{name}_real_t", f"{name}_history_t *h" if history else f"{name}_t *kf"
     return (
-        f"void {name}_kfgen_run({name}_t *kf, size_t rows, const uint8_t *step, const {real} *dt, "
-        f"const {real} *u, const uint32_t *mask, const {real} *z, {real} *x, {real} *rest, {real} *var, {real} *nis, "
-        f"{real} *mu, {real} *out, {real} *deviation, uint8_t *told, uint32_t *status)"
+        f"void {name}_kfgen_run({whole}, size_t rows, const uint8_t *step, const {real} *dt, "
+        f"const {real} *u, const uint32_t *mask, const uint32_t *age, const {real} *z, {real} *x, {real} *rest, "
+        f"{real} *var, {real} *nis, {real} *mu, {real} *out, {real} *deviation, uint8_t *told, uint32_t *status)"
     )
 
 

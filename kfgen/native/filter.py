@@ -211,7 +211,7 @@ class NativeFilter:
 
     def copy(self) -> NativeFilter:
         """An independent filter in the same state."""
-        other = object.__new__(NativeFilter)
+        other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other.struct = self.struct.copy()
         return other

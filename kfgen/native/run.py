@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.errors import KfgenError
+from kfgen.late import ages
 from kfgen.logs import Log, Source, as_log
 from kfgen.native.struct import Struct
 from kfgen.native.values import Array
@@ -30,7 +31,8 @@ class RunResult:
     NaN where that sensor was not updated or its update failed. status: [N] uint32, the bits of all calls of
     the row. calls: function -> [N] uint32, its own status (0 where it was not called). mu: [N, modes] for an
     imm, else None. outputs, output_std: name -> [N], what the spec's `outputs` are after the row, and their standard
-    deviations; NaN where the filter refuses to tell them.
+    deviations; NaN where the filter refuses to tell them. age: sensor -> [N], how many predictions late its reading
+    was, where the filter has a history.
     """
 
     t: Array
@@ -42,6 +44,17 @@ class RunResult:
     mu: Array | None = None
     outputs: Mapping[str, Array] = field(default_factory=dict)
     output_std: Mapping[str, Array] = field(default_factory=dict)
+    age: Mapping[str, NDArray[np.uint32]] = field(default_factory=dict)
+
+    def late(self) -> dict[str, tuple[int, float, int]]:
+        """Of sensors whose readings came late: how many did, how many predictions on average, and at most; without
+        those that were too old."""
+        found = {}
+        for sensor, age in self.age.items():
+            taken = age[(age > 0) & ~np.isnan(self.nis[sensor])]
+            if taken.size:
+                found[sensor] = int(taken.size), float(taken.mean()), int(taken.max())
+        return found
 
     def counts(self, errors: bool = True) -> dict[str, dict[Status, int]]:
         """How often each function returned each error (or warning) bit; functions without are left out."""
@@ -68,7 +81,8 @@ class Plan:
     """What is to be done in each row; float64, physical.
 
     step: [N] whether to predict. dt: [N] s. u: [N, nu]. mask: [N, sensors] bits of the components to use, 0
-    for no update. z: [N, components and own inputs of all sensors], 0 where there is none. t: [N] s.
+    for no update. z: [N, components and own inputs of all sensors], 0 where there is none. t: [N] s. age: [N, sensors]
+    how many predictions ago a reading was made, where the filter has a history.
     """
 
     t: Array
@@ -77,6 +91,7 @@ class Plan:
     u: Array
     mask: NDArray[np.uint32]
     z: Array
+    age: NDArray[np.uint32]
 
 
 def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
@@ -114,7 +129,9 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
         mask[:, i] = bits if sensor.partial else np.where(bits == full, full, 0)
         mask[np.isnan(z[:, m:]).any(axis=1), i] = 0
         values.append(np.where(np.isnan(z), 0.0, z))
-    return Plan(t, step.astype(np.uint8), difference, u, mask, np.hstack(values) if values else np.empty((rows, 0)))
+    steps, z = step.astype(np.uint8), np.hstack(values) if values else np.empty((rows, 0))
+    age = np.zeros_like(mask) if spec.history is None else ages(spec, log, t, steps)
+    return Plan(t, steps, difference, u, mask, z, age)
 
 
 def _held(column: Array, name: str, source: str) -> Array:
@@ -144,6 +161,7 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         "dt": scalar.to_raw(work.dt, units.dt),
         "u": scalar.to_raw(work.u, units.u),
         "mask": work.mask.copy(),
+        "age": work.age if struct.has_past else np.zeros_like(work.age),
         "z": scalar.to_raw(scalar.near(work.z, units.reading_periods), units.readings),
         "x": np.zeros((rows, n), scalar.dtype),
         "rest": np.zeros((rows, len(struct.compensated)), scalar.dtype),
@@ -181,6 +199,7 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         mu=scalar.to_physical(arrays["mu"], units.one) if modes else None,
         outputs=told["out"],
         output_std=told["deviation"],
+        age={name: work.age[:, i] for i, name in enumerate(units.z)} if struct.has_past else {},
     )
 
 
@@ -191,7 +210,8 @@ def _call(
     progress: Callable[[int, int], None] | None,
 ) -> None:
     ffi, function = struct.ffi, getattr(struct.lib, f"{struct.name}_kfgen_run")
-    types = {"step": "uint8_t *", "told": "uint8_t *", "mask": "uint32_t *", "status": "uint32_t *"}
+    types = dict.fromkeys(("step", "told"), "uint8_t *")
+    types |= dict.fromkeys(("mask", "age", "status"), "uint32_t *")
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     for first in range(0, rows, CHUNK):
         count = min(CHUNK, rows - first)
@@ -201,7 +221,7 @@ def _call(
             else ffi.NULL
             for name, array in contiguous.items()
         ]
-        function(struct.data, count, *pointers)
+        function(struct.whole, count, *pointers)
         if progress:
             progress(first + count, rows)
 

@@ -34,6 +34,14 @@ class Struct:
         self.compensated = tuple(i for i, s in enumerate(spec.states) if s.name in spec.code.compensated)
         self.fields = {name for name, _ in ffi.typeof(f"{spec.name}_t").fields}
 
+    has_past = False
+    """Whether the filter stands in a history."""
+
+    @property
+    def whole(self) -> Any:
+        """The pointer to all that a run changes."""
+        return self.data
+
     def copy(self) -> Struct:
         """Another struct of the same bytes."""
         other = object.__new__(Struct)

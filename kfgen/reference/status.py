@@ -21,6 +21,7 @@ class Status(IntFlag):
     NULL_ARGUMENT = 0x100
     NOT_FINITE = 0x200
     NOT_POSITIVE = 0x400
+    TOO_OLD = 0x800
 
 
 class StepError(Exception):

@@ -57,7 +57,7 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
     sizes = {"NX": True, "NE": bool(spec.rotations), "NU": bool(spec.inputs), "NB": spec.imm is not None}
     for word in (word for word, there in sizes.items() if there):
         yield f"{upper}_{word}", "a size", own
-    for word in STATUS:
+    for word in (*STATUS, *(("TOO_OLD",) if spec.history else ())):
         yield f"{upper}_{word}", "a status", own
     yield f"{upper}_H_INCLUDED", "the header guard", own
     functions = ["init", "predict", "set_state", "set_covariance", "get_covariance"]
@@ -75,6 +75,8 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
         yield f"{lower}_{word}", "a type", own
     for word in functions:
         yield f"{lower}_{word}", "a function", own
+    if spec.history is not None:
+        yield from _of_history(spec)
     for state in spec.states:
         yield f"{upper}_{state.name.upper()}", f"the index of the state `{state.name}`", state.place
     for error in spec.errors if spec.rotations else ():
@@ -93,6 +95,21 @@ def identifiers(spec: Spec) -> Iterator[tuple[str, str, Place]]:
         yield f"{lower}_mode_{mode.name}_t", f"the type of the mode `{mode.name}`", mode.place
     if is_fixed(spec.scalar):
         yield from _scaled(spec, upper)
+
+
+def _of_history(spec: Spec) -> Iterator[tuple[str, str, Place]]:
+    """What the header of the history declares."""
+    name, place = spec.name, spec.history.place if spec.history is not None else spec.place
+    for word in ("STEPS", "RING", "PER_STEP", "KEEP", "H_INCLUDED"):
+        yield f"{name.upper()}_HISTORY_{word}", "a macro of the history", place
+    for word in ("t", "step_t", "measurement_t"):
+        yield f"{name}_history_{word}", "a type of the history", place
+    for word in ("init", "predict", "set_state", "set_covariance", "set_sqrt_covariance"):
+        yield f"{name}_history_{word}", "a function of the history", place
+    for sensor in spec.measurements:
+        for ending in ("", "_masked") if sensor.partial else ("",):
+            text = f"the update of the sensor `{sensor.name}` in the history"
+            yield f"{name}_history_update_{sensor.name}{ending}", text, sensor.place
 
 
 def _scaled(spec: Spec, upper: str) -> Iterator[tuple[str, str, Place]]:

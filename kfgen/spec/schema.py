@@ -38,6 +38,7 @@ ADVICE = {
     "sigma_angle": "sigma points lie more than half a turn from the mean of an angle",
     "alpha": "alpha makes weights that the scalar cannot carry",
     "ud_cost": "a prediction with `covariance: full` takes a third of the operations",
+    "per_step": "a sensor's `rate` may bring more measurements in a step than `history` keeps of one",
     "loops": "more than 32 kB of straight-line code, of which loops take a tenth",
 }
 """The names of all advice, and where it is given."""
@@ -81,6 +82,25 @@ IMM = Record(
         ),
         Key("mu0", Items(CONSTANT, "mode probabilities"), "The initial mode probabilities.", "all equal"),
         Key("mu_floor", CONSTANT, "The smallest mode probability; keeps a mode alive.", "1e-9"),
+    ),
+)
+
+HISTORY = Record(
+    "history",
+    (
+        Key(
+            "steps",
+            Whole(1, 10_000),
+            "How many predictions late a measurement may be; one that is older is refused (TOO_OLD).",
+            required=True,
+        ),
+        Key("per_step", Whole(1, 255), "Measurements that are kept of one step; the next is TOO_OLD.", "4"),
+        Key(
+            "keep",
+            Whole(1, 10_000),
+            "Each so many-th state is kept: less RAM, and up to keep - 1 predictions more to repeat.",
+            "1",
+        ),
     ),
 )
 
@@ -131,13 +151,19 @@ TOP = Record(
         Key("fixed", FIXED, "Fixed-point choices; used with a q scalar only, allowed with any."),
         Key("code", CODE, "What the emitted code looks like, and what it may cost."),
         Key("advice", Items(Choice(tuple(ADVICE)), "names of advice"), "What `kfgen build` is not to advise."),
+        Key(
+            "history",
+            HISTORY,
+            "Also emit <name>_history.h and .c, which take late measurements, of any sensor, at their time: the result "
+            "is bit for bit that of the same calls in order.",
+        ),
         Key("imm", IMM, "An interacting-multiple-model filter: several modes over the same states."),
     ),
 )
 
 RECORDS: tuple[Record, ...] = (
     TOP, PARAMETER, STEP, STATE, INITIALIZE, INPUT, NOISE, OUTPUT, DYNAMICS, SENSOR, COMPONENT, SENSOR_NOISE, GATE,
-    FILTER, FIXED, CODE, IMM, MODE,
+    FILTER, FIXED, CODE, HISTORY, IMM, MODE,
 )  # fmt: skip
 
 __all__ = ["IMM", "MODE", "RECORDS", "SENSOR", "STATE", "TOP"]

@@ -19,6 +19,22 @@ def columns_of(sensor: Sensor) -> list[str]:
     return [f"{sensor.name}.{each.name}" for each in sensor.fields]
 
 
+AGE, TIME = "age", "time"
+"""What a column of a log says of a reading beside its numbers, in s: how late it is, or when it was made."""
+
+
+def tells(sensor: Sensor, word: str) -> bool:
+    """Whether the column `<sensor>.<word>` tells of lateness: a sensor may have a component of that name."""
+    return word not in {each.name for each in sensor.fields}
+
+
+def late_columns(spec: Spec) -> list[str]:
+    """The columns that a log of a filter that takes late measurements may have beside those that it needs."""
+    if spec.history is None:
+        return []
+    return [f"{s.name}.{word}" for s in spec.measurements for word in (AGE, TIME) if tells(s, word)]
+
+
 def readings_of(spec: Spec) -> list[tuple[Sensor, slice]]:
     """Each sensor, and where its numbers stand where those of all sensors are in one row."""
     found, first = [], 0

@@ -216,6 +216,17 @@ class Sensor:
 
 
 @dataclass(frozen=True)
+class History:
+    """Measurements may arrive up to `steps` predictions late, `per_step` of one step; each `keep`-th state is kept."""
+
+    steps: int
+    per_step: int = 4
+    keep: int = 1
+    place: Place = NOWHERE
+    places: Mapping[str, Place] = field(default_factory=dict)  # of the keys that were written
+
+
+@dataclass(frozen=True)
 class Mode:
     """One mode of an imm; every field is complete (top-level keys that the mode does not replace are filled in)."""
 
@@ -266,6 +277,7 @@ class Spec:
     fixed: Fixed = field(default_factory=Fixed)
     code: Code = field(default_factory=Code)
     imm: Imm | None = None
+    history: History | None = None
     groups: tuple[Group, ...] = ()  # vectors and matrices (by rows) of constants, parameters, states, inputs, noises
     rotations: tuple[Rotation, ...] = ()  # states that are quaternions, in order
     outputs: tuple[Output, ...] = ()

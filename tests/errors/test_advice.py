@@ -233,7 +233,7 @@ def test_loops_are_told_where_they_take_a_tenth() -> None:
 
 
 def test_every_name_is_one_of_the_languages() -> None:
-    names = {name for _, name, _ in DUE} | {"degrees", "sigma_angle", "alpha", "loops", "ud_cost"}
+    names = {name for _, name, _ in DUE} | {"degrees", "sigma_angle", "alpha", "loops", "ud_cost", "per_step"}
     assert names == set(ADVICE)
 
 

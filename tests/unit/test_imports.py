@@ -32,6 +32,7 @@ ALLOWED = {
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
     "logs": SPEC | {"files"},
+    "late": SPEC | {"logs"},
     "reference": {"errors", "spec"},
     # from a spec to C
     "ir": {"errors"},
@@ -47,7 +48,7 @@ ALLOWED = {
     "advice": SPEC | {"generate", "reference", "simulate"},
     # the compiled filter, and what uses it
     "simulate": SPEC | {"geometry", "logs", "reference"},
-    "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
+    "native": SPEC | {"emit", "files", "generate", "late", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC
     | {"advice", "generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
@@ -59,7 +60,7 @@ ALLOWED = {
     "difference": SPEC | {"generate", "geometry", "logs", "native"},
     "tools": {"__init__", "errors", "native"},
     "commands": SPEC
-    | {"advice", "check", "cost", "difference", "examples", "files", "generate", "layouts", "logs", "native"}
+    | {"advice", "check", "cost", "difference", "examples", "files", "generate", "late", "layouts", "logs", "native"}
     | {"override", "plot", "reference", "seal", "selftest", "simulate", "status", "tools"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},

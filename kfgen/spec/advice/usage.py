@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from kfgen.spec.types import Definition, Group, Spec
 
 def advice(spec: Spec) -> Iterator[Advice]:
     yield from _unused(spec)
+    yield from _crowded(spec)
     for mode in mode_specs(spec):
         yield from _noises(mode)
         if not _driven(mode):
@@ -89,6 +91,21 @@ class Whole:
     def parts(self, name: str) -> set[str]:
         """The parts of the vector of a part, itself where it is of none."""
         return set(self.groups[name].parts) if name in self.groups else {name}
+
+
+def _crowded(spec: Spec) -> Iterator[Advice]:
+    """A history that keeps fewer measurements of a step than its sensors may bring."""
+    history = spec.history
+    if history is None:
+        return
+    known = environment_of(spec, folded=False)
+    rates = {s.name: 1.0 if s.rate is None else float(value(s.rate.tree, known)) for s in spec.measurements}
+    total = math.ceil(sum(max(rate, 1.0) for rate in rates.values()))
+    if total > history.per_step:
+        often = ", ".join(f"{name} {rate:g}" for name, rate in rates.items())
+        text = f"{total} measurements may belong to one step ({often}), but {history.per_step} are kept of it"
+        at = history.places.get("per_step", history.place)
+        yield Advice(at, text, f"write `per_step: {total}`: what comes beyond is TOO_OLD", "per_step")
 
 
 def _noises(mode: Spec) -> Iterator[Advice]:

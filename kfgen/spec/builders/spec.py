@@ -12,7 +12,7 @@ from kfgen.spec.problems import short
 from kfgen.spec.raw import Fields, Word, entries, limits, matrix
 from kfgen.spec.shaping.shaper import Shaper
 from kfgen.spec.tree import Expression
-from kfgen.spec.types import Code, Constant, Fixed, Initialize, Output, Parameter, Spec, Step, error_names
+from kfgen.spec.types import Code, Constant, Fixed, History, Initialize, Output, Parameter, Spec, Step, error_names
 from kfgen.spec.walk import Walker
 
 
@@ -61,6 +61,7 @@ class Builder:
             filter=self.filters.filter(top.get("filter"), errors),
             fixed=self.fixed(),
             code=self.code(),
+            history=self.history(),
             groups=tuple(self.shaper.groups.values()),
             rotations=rotations,
             outputs=self.outputs(),
@@ -128,6 +129,14 @@ class Builder:
         by_state = dict(entries(scale)) if isinstance(scale, Fields) else None
         at = f.places.get("log", f.place)
         return Fixed(by_state, f.get("rounding", "nearest"), f.get("overflow", "saturate"), f.get("log"), at)
+
+    def history(self) -> History | None:
+        f = self.top.get("history")
+        if not isinstance(f, Fields):
+            return None
+        number = self.values.number
+        steps, per_step, keep = number(f.get("steps")), number(f.get("per_step")), number(f.get("keep"))
+        return History(steps or 1, per_step or 4, keep or 1, f.place, dict(f.places))
 
     def compensated(self, written: object) -> tuple[str, ...]:
         if isinstance(written, bool):
