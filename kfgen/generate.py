@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -35,24 +35,37 @@ class Summary:
     rows: list[tuple[str, dict[str, int]]]
     ram: int
     notes: list[str]
-    prediction: Prediction | None = None
-    forms: Mapping[str, str] = field(default_factory=dict)
+    prediction: Prediction
+    forms: Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class Generated:
-    """The files of a filter, what they cost, and the program they were printed from."""
+    """The files of a filter, and the program they were printed from. real: the program before it was lowered to
+    integers; told: further remarks."""
 
     files: dict[str, str]
-    summary: Summary
     code: FilterCode
     view: View
+    scalar: Scalar
+    real: FilterCode
+    told: Sequence[str] = ()
     fixed: FixedFilter | None = None
 
     @property
     def spec(self) -> Spec:
         """The spec as it was generated, its scalar with it."""
         return self.code.model.spec
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """What the filter will take of a Cortex-M4F."""
+        return _predicted(self.code, self.scalar, self.view)
+
+    @cached_property
+    def summary(self) -> Summary:
+        """What the build table shows."""
+        return _summary(self.real, self.view.ram, self.prediction, self.told)
 
     @cached_property
     def declarations(self) -> Declarations:
@@ -87,8 +100,7 @@ def _built(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Genera
         raise SpecError.at(
             place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
         ) from None
-    prediction = _predicted(spec, code, SCALARS[spec.scalar], view, judge)
-    return Generated(_rendered(view), replace(summary(code, view), prediction=prediction), code, view)
+    return _judged(Generated(_rendered(view), code, view, SCALARS[spec.scalar], code), judge)
 
 
 def _rendered(view: View) -> dict[str, str]:
@@ -96,14 +108,19 @@ def _rendered(view: View) -> dict[str, str]:
     return {name: sealed(name, text) for name, text in render(view).items()}
 
 
-def _predicted(spec: Spec, code: FilterCode, scalar: Scalar, view: View, judge: bool) -> Prediction:
-    """Held against the spec's budgets, if they are to be judged."""
+def _predicted(code: FilterCode, scalar: Scalar, view: View) -> Prediction:
     routines = () if view.routines is None else (*view.routines.ops, *view.routines.own)
-    prediction = predict(spec, code, scalar, view.ram, routines)
-    mistakes = exceeded(spec, prediction)
-    if judge and mistakes:
-        raise SpecError(mistakes)
-    return prediction
+    return predict(code.model.spec, code, scalar, view.ram, routines)
+
+
+def _judged(made: Generated, judge: bool) -> Generated:
+    """The same, held against the spec's budgets, if it has any and they are to be judged."""
+    code = made.spec.code
+    if judge and (code.flash, code.ram, code.stack) != (None, None, None):
+        mistakes = exceeded(made.spec, made.prediction)
+        if mistakes:
+            raise SpecError(mistakes)
+    return made
 
 
 def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Generated:
@@ -112,12 +129,9 @@ def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Genera
     logs = [each for each in (_named(spec), log) if each is not None]
     result = build_fixed(real, scalar, logs)
     view = make_view(result.code, scalar, overridden, result.view)
-    told = replace(summary(real, view), prediction=_predicted(spec, result.code, scalar, view, judge))
-    if spec.code.unroll == "none":
-        told.notes.append(UNROLLED)
-    told.notes.extend(result.told)
-    told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
-    return Generated(_rendered(view), told, result.code, view, result)
+    told = [UNROLLED] if spec.code.unroll == "none" else []
+    told += [*result.told, "value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)]
+    return _judged(Generated(_rendered(view), result.code, view, scalar, real, told, result), judge)
 
 
 def _named(spec: Spec) -> Log | None:
@@ -134,13 +148,11 @@ def _named(spec: Spec) -> Log | None:
     raise SpecError.at(spec.fixed.log_place, f"the log {path} cannot be read: {reason}", "name a log of this filter")
 
 
-def summary(code: FilterCode, view: View) -> Summary:
-    """What the build table shows of a filter."""
+def _summary(code: FilterCode, ram: int, prediction: Prediction, told: Sequence[str]) -> Summary:
     rows = []
     for function in code.functions:
-        counts = operations(function.body)
         if function.name == "predict" or function.name.startswith("update_"):
-            rows.append((function.name, counts or {}))
+            rows.append((function.name, operations(function.body) or {}))
     notes = [code.description]
     if code.order != tuple(range(len(code.order))):
         notes.append("inner order: " + " ".join(code.model.states[i] for i in code.order))
@@ -148,8 +160,8 @@ def summary(code: FilterCode, view: View) -> Summary:
         inner = " ".join(code.model.states[i] for i in mode.order)
         order = "" if mode.order == code.order else f"; inner order: {inner}"
         notes.append(f"{mode.name}: {mode.description}{order}")
-    notes += code.remarks
-    return Summary(rows, view.ram, notes, None, code.forms)
+    notes += [*code.remarks, *told]
+    return Summary(rows, ram, notes, prediction, code.forms)
 
 
 def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:

@@ -124,9 +124,9 @@ class Argument:
     size: int | None = None  # arrays: type name[size]
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False, weakref_slot=True)
 class Function:
-    """An emitted function: its body is scheduled (every shared value has its Let)."""
+    """An emitted function: its body is scheduled (every shared value has its Let), and is not changed any more."""
 
     name: str
     arguments: list[Argument]
@@ -191,5 +191,5 @@ def walk(body: list[Statement]) -> Iterator[Statement]:
     """Every statement, those inside loops included."""
     for statement in body:
         yield statement
-        if isinstance(statement, For | If):
+        if isinstance(statement, (For, If)):  # a tuple, for the speed
             yield from walk(statement.body)

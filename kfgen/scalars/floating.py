@@ -14,6 +14,11 @@ _LIBM = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "t
          "atan2", "pow")  # fmt: skip
 
 
+def _power(exponent: int) -> Fraction:
+    """Of two."""
+    return Fraction(1 << exponent) if exponent >= 0 else Fraction(1, 1 << -exponent)
+
+
 class Floating:
     """An IEEE 754 type."""
 
@@ -33,6 +38,7 @@ class Floating:
         self.probability = Fraction(0)
         self._mantissa = info.nmant + 1
         self._smallest = int(info.minexp) - info.nmant
+        self._literals: dict[Fraction, str] = {}
 
     def nearest(self, value: Fraction) -> Fraction:
         """Round half to even at this type's precision, once, from the exact value."""
@@ -40,15 +46,19 @@ class Floating:
             return value
         magnitude = abs(value)
         exponent = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
-        while Fraction(2) ** exponent > magnitude:
+        if _power(exponent) > magnitude:  # the lengths tell it but for one
             exponent -= 1
-        while Fraction(2) ** (exponent + 1) <= magnitude:
-            exponent += 1
-        unit = Fraction(2) ** max(exponent - self._mantissa + 1, self._smallest)
+        unit = _power(max(exponent - self._mantissa + 1, self._smallest))
         rounded = round(magnitude / unit) * unit
         return rounded if value > 0 else -rounded
 
     def literal(self, value: Fraction) -> str:
+        text = self._literals.get(value)
+        if text is None:
+            text = self._literals[value] = self._literal(value)
+        return text
+
+    def _literal(self, value: Fraction) -> str:
         with np.errstate(over="ignore"):
             number = self.dtype(float(self.nearest(value)))
         if not np.isfinite(number):
