@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from fractions import Fraction
 from typing import Any
 
@@ -83,25 +84,24 @@ class Floating:
             value = float(self.nearest(value))
         return self.dtype(value)
 
+    def quiet(self) -> AbstractContextManager[object]:
+        return np.errstate(all="ignore")
+
     def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
-        if op == "sum":
-            return self._sum(data, args)
-        with np.errstate(all="ignore"):
-            return _OPERATIONS[op](self, data, *args)
+        return self._sum(data, args) if op == "sum" else _OPERATIONS[op](self, data, *args)
 
     def _sum(self, pattern: tuple[tuple[int, int], ...], factors: list[Any]) -> Any:
         """Left to right, each product and each sum rounded, as C does without contraction."""
         total: Any = None
         position = 0
-        with np.errstate(all="ignore"):
-            for sign, count in pattern:
-                term = factors[position]
-                if total is None and sign < 0:
-                    term = -term
-                if count == 2:
-                    term = term * factors[position + 1]
-                position += count
-                total = term if total is None else total + term if sign > 0 else total - term
+        for sign, count in pattern:
+            term = factors[position]
+            if total is None and sign < 0:
+                term = -term
+            if count == 2:
+                term = term * factors[position + 1]
+            position += count
+            total = term if total is None else total + term if sign > 0 else total - term
         return total
 
 

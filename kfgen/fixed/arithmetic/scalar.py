@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from fractions import Fraction
 from typing import Any
 
@@ -46,6 +47,9 @@ class Fixed:
 
     def convert(self, value: Any) -> Any:
         return int(value)
+
+    def quiet(self) -> AbstractContextManager[object]:
+        return nullcontext()
 
     def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
         if op == "q_mac":
