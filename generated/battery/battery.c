@@ -49,11 +49,12 @@ static bool battery_finite(float a)
     return (view.bits & exponent) != exponent;
 }
 
-/* the segment of a table in which a lies: 0 before the first of n points, n from the last one on */
+/* the segment of a table in which a lies: 0 before the first of n points, n beyond the last one */
 static int battery_segment(float a, const float x[], int n)
 {
     int i = 0;
     while (i < n && BATTERY_at(x, i + 1) <= a) { i++; }
+    if (i == n && !(BATTERY_at(x, n) < a)) { i--; }
     return i;
 }
 
@@ -307,4 +308,4 @@ void battery_get_covariance(const battery_t *kf, battery_real_t P[9])
         }
     }
 }
-/* kfgen: body bdbd651582388cebcaca71f67bb38c35 */
+/* kfgen: body 5bbbed119a241d4281c7701db8d74aed */

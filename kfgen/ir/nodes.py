@@ -23,7 +23,7 @@ REAL, BOOL, INT = "real", "bool", "int"
 class Table:
     """A piecewise linear function through n points, abscissae ascending, constant beyond the ends.
 
-    It has n + 1 segments: before the first point, between points, from the last point on.
+    It has n + 1 segments: before the first point, between points, beyond the last one. An end belongs to the inside.
     """
 
     x: tuple[Fraction, ...]

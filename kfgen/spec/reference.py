@@ -64,8 +64,8 @@ _TITLES = {
 
 _FUNCTION_NOTES = {
     "where": "`where(condition, a, b)`: a where the condition holds, else b; only that one may fail",
-    "table": "`table(x, [x1, x2, ...], [y1, y2, ...])`: linear between the points, clamped at the ends; "
-    "the first list increases",
+    "table": "`table(x, [x1, x2, ...], [y1, y2, ...])`: linear between the points, clamped beyond the ends (there the "
+    "slope is that of the inside); the first list increases",
     "sign": "`sign(x)`: -1, 0 or 1",
     "atan2": "`atan2(y, x)`",
     "hypot": "`hypot(x, y)`",

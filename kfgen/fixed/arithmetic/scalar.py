@@ -103,7 +103,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "lt": lambda d, a, b: a < b,
     "le": lambda d, a, b: a <= b,
     "not": lambda d, a: not a,
-    "segment": lambda d, a: sum(1 for v in d.x if v <= a),
+    "segment": lambda d, a: sum(1 for v in d.x[:-1] if v <= a) + (d.x[-1] < a),
     "table_x": lambda d, i: int(d.starts()[i]),
     "table_y": lambda d, i: int(d.values()[i]),
     "table_slope": lambda d, i: int(d.slopes()[i]),
