@@ -125,7 +125,7 @@ def _wrap(s: Floating, period: Fraction, a: Any) -> Any:
 
 
 def _segment(s: Floating, table: Any, a: Any) -> int:
-    return sum(1 for v in table.x[:-1] if s.convert(v) <= a) + (s.convert(table.x[-1]) < a)
+    return sum(1 for v in table.x[:-1] if s.convert(v) <= a) + int(s.convert(table.x[-1]) < a)
 
 
 def _table(s: Floating, table: Any, i: int, a: Any) -> Any:

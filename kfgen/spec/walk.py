@@ -265,7 +265,9 @@ class Walker:
             inner = (*path, name.text)
             place = self.problems.at(name.line, name.column, path_text(inner))
             if key is None:
-                self.problems.add(place, f"unknown key {short(name.text)}", unknown_key_hint(name.text, known))
+                written = value.text if isinstance(value, Scalar) else ""
+                hint = unknown_key_hint(name.text, known, short(written)[1:-1])
+                self.problems.add(place, f"unknown key {short(name.text)}", hint)
                 meant = meant_key(name.text, known)
                 self.meant.add(path_text((*path, meant)))
                 if isinstance(value, Mapping):
