@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfgen.spec.problems import did_you_mean, suggestion
+from kfgen.spec.problems import did_you_mean, short, suggestion
 from kfgen.spec.shapes import (
     Budget,
     Choice,
@@ -45,7 +45,7 @@ def unknown_key_hint(word: str, known: list[str], value: str = "") -> str:
     if _is_kind(word, known):
         told = value.lower() not in ("", "true", "yes", "on", "1", "angle", "false", "no", "off", "0")
         angle = word.lower() in _WRAPPED and not told
-        return "write `kind: angle`" if angle else f"write `kind: {{periodic: {value if told else 'P'}}}`"
+        return "write `kind: angle`" if angle else f"write `kind: {{periodic: {short(value)[1:-1] if told else 'P'}}}`"
     synonym = _SYNONYMS.get(word)
     return f"did you mean `{synonym}`?" if synonym in known else did_you_mean(word, known, "keys here")
 

@@ -97,7 +97,8 @@ DECISIONS = (
     "are not kept; a gate is allowed. It assumes that each prediction is followed by one update of each "
     "sensor, in order; get_covariance gives P after the last of them.",
     "adapt_R and adapt_Q lie strictly between 0 and 1; leave them out to switch them off. adapt_Q is "
-    "there for kf, ekf and ekf2.",
+    "there for kf, ekf and ekf2. With a run-time dt, Q may be a constant times dt: it is then kept, read "
+    "and learnt per second, each correction divided by the last step.",
     "Custom sigma points have one column per state, and so exclude `augment` with noises; wm sums to 1; "
     "`reject` needs a row of zeros among them.",
     "Covariances are checked where they are constant (P0 with parameters at their spec values): "

@@ -265,11 +265,9 @@ class Walker:
             inner = (*path, name.text)
             place = self.problems.at(name.line, name.column, path_text(inner))
             if key is None:
-                written = value.text if isinstance(value, Scalar) else ""
-                hint = unknown_key_hint(name.text, known, short(written)[1:-1])
+                hint = unknown_key_hint(name.text, known, value.text if isinstance(value, Scalar) else "")
                 self.problems.add(place, f"unknown key {short(name.text)}", hint)
-                meant = meant_key(name.text, known)
-                self.meant.add(path_text((*path, meant)))
+                self.meant.add(path_text((*path, meant_key(name.text, known))))
                 if isinstance(value, Mapping):
                     self.doubtful.update(inner_key.text for inner_key, _ in value.items)
                 continue
