@@ -16,8 +16,12 @@ from kfgen import __version__
 from kfgen.commands.build import build
 from kfgen.commands.check import check
 from kfgen.commands.cost import cost
+from kfgen.commands.diff import diff
+from kfgen.commands.doctor import doctor
 from kfgen.commands.language import language
+from kfgen.commands.new import new
 from kfgen.commands.run import run
+from kfgen.commands.schema import schema
 from kfgen.commands.simulate import simulate
 from kfgen.errors import KfgenError
 
@@ -78,7 +82,7 @@ def cli() -> None:
     """Turn Kalman-filter specs in YAML into specialised C."""
 
 
-for command in (build, check, run, simulate, cost, language):
+for command in (new, build, check, run, simulate, cost, diff, language, schema, doctor):
     cli.add_command(command)
 
 

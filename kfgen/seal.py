@@ -6,7 +6,7 @@ import hashlib
 import re
 from pathlib import PurePath
 
-_MARKS = {".h": "/* {} */", ".c": "/* {} */", ".ino": "// {}"}
+_MARKS = {".h": "/* {} */", ".c": "/* {} */", ".ino": "// {}", ".cpp": "// {}"}
 _SEAL = re.compile(r"^(?:/\*|//|#) kfgen: body ([0-9a-f]{32})(?: \*/)?\n?|; kfgen: body ([0-9a-f]{32})", re.MULTILINE)
 _NO_COMMENTS = (".json", ".properties")  # what reads these takes no line that it does not know
 _COMMAND = re.compile(r"(kfgen build [^\n\"]*?)(?=\)?\"?,?$)", re.MULTILINE)

@@ -1,4 +1,4 @@
-"""A library target of CMake, `<name>::<name>`; with a self-test, a test of CTest."""
+"""A library target of CMake, `<name>::<name>`, to add or to install; with a self-test, a test of CTest."""
 
 from __future__ import annotations
 

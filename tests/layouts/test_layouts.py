@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from configparser import ConfigParser
 from pathlib import Path
 
 import jsonschema
@@ -93,6 +94,27 @@ def test_cmake_target_in_another_project(build, needs):
     run(folder.parent, "out/firmware")
 
 
+def test_cmake_package_is_found_where_it_is_installed(build, needs):
+    needs("cmake", "cc")
+    folder = build("cmake", SPEC, "--selftest")
+    run(folder, "cmake", "-S", ".", "-B", "out", "-DCMAKE_INSTALL_PREFIX=../prefix", "-DCMAKE_BUILD_TYPE=Release")
+    run(folder, "cmake", "--build", "out", "--target", "install")
+    user = folder.parent / "user"
+    user.mkdir()
+    (user / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.13)\nproject(firmware C)\nfind_package(on REQUIRED)\n"
+        "add_executable(firmware main.c)\ntarget_link_libraries(firmware PRIVATE on::on_selftest)\n"
+    )
+    (user / "main.c").write_text(
+        "#include <on.h>\nint on_selftest(void);\n"
+        "int main(void) { on_t kf; return (int)on_init(&kf) + on_selftest(); }\n"
+    )
+    run(user, "cmake", "-S", ".", "-B", "out", f"-DCMAKE_PREFIX_PATH={folder.parent / 'prefix'}")
+    run(user, "cmake", "--build", "out")
+    run(user, "out/firmware")
+    assert "/tmp" not in "".join(path.read_text() for path in (folder.parent / "prefix").rglob("onConfig*.cmake"))
+
+
 @pytest.mark.parametrize("options", [[], ["--selftest"]])
 def test_arduino_sketch_compiles_as_cplusplus(build, needs, options):
     needs("avr-g++")
@@ -165,8 +187,24 @@ def test_platformio_manifest(build):
     manifest = json.loads((folder / "library.json").read_text())
     jsonschema.validate(manifest, LIBRARY_JSON)
     assert manifest["name"] == "on"
-    assert files(folder) == {"library.json", "src/on.h", "src/on.c", "src/on_selftest.c"}
+    example = {f"examples/on_example/{name}" for name in ("platformio.ini", "src/main.cpp")}
+    assert files(folder) == {"library.json", "src/on.h", "src/on.c", "src/on_selftest.c"} | example
     assert (folder / manifest["build"]["includeDir"] / manifest["headers"]).is_file()
+
+
+@pytest.mark.parametrize("options", [[], ["--selftest"]])
+def test_platformio_example(build, needs, options):
+    """The project names the library beside it, and its program is C++ for the board."""
+    needs("avr-g++")
+    folder = build("platformio", SPEC, *options)
+    example = folder / "examples/on_example"
+    project = ConfigParser()
+    project.read(example / "platformio.ini")
+    assert (example / project["env"]["lib_deps"].removeprefix("symlink://")).resolve() == folder.resolve()
+    assert {"platform", "board"} <= set(project["env:board"])
+    assert ("on_selftest()" in (example / "src/main.cpp").read_text()) == bool(options)
+    run(folder, "avr-g++", "-mmcu=atmega328p", "-Os", "-Wall", "-Wextra", "-Werror", "-I", "src", "-I", BOARDS, "-c",
+        example / "src/main.cpp", "-o", "o.o")  # fmt: skip
 
 
 # scripts/zephyr_module.py of Zephyr: the part of its schema that is used
@@ -181,6 +219,7 @@ MODULE_YML = {
             "additionalProperties": False,
             "properties": {"cmake": {"type": "string"}, "kconfig": {"type": "string"}},
         },
+        "samples": {"type": "array", "items": {"type": "string"}},
     },
 }
 
@@ -214,3 +253,21 @@ def test_zephyr_module(build, needs):
     symbols = run(folder.parent, "nm", "out/on/libon.a")
     assert "on_predict" in symbols
     assert "on_selftest" in symbols
+
+
+@pytest.mark.parametrize(("options", "says"), [([], "on: ready\n"), (["--selftest"], "on: self-test passed\n")])
+def test_zephyr_sample(build, needs, options, says):
+    """The application runs on the host, with a printk that prints; west's own files name what is there."""
+    needs("cc")
+    folder = build("zephyr", SPEC, *options)
+    (samples,) = YAML(typ="safe", pure=True).load((folder / "zephyr/module.yml").read_text())["samples"]
+    sample = folder / samples / "on"
+    told = YAML(typ="safe", pure=True).load((sample / "sample.yaml").read_text())
+    assert told["tests"]["sample.kfgen.on"]["harness_config"]["regex"] == [says.rstrip()]
+    assert ("CONFIG_KFGEN_ON_SELFTEST=y" in (sample / "prj.conf").read_text()) == bool(options)
+    kernel = folder.parent / "zephyr/kernel.h"
+    kernel.parent.mkdir()
+    kernel.write_text("#include <stdio.h>\n#define printk printf\n")
+    sources = [*folder.glob("*.c"), sample / "src/main.c"]
+    run(folder, "cc", "-Wall", "-Wextra", "-Werror", "-I", folder.parent, "-I", ".", *sources, "-lm", "-o", "sample")
+    assert run(folder, folder / "sample") == says

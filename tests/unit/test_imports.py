@@ -27,6 +27,7 @@ ALLOWED = {
     "scalar_names": set(),
     "files": {"errors"},
     "seal": set(),
+    "examples": {"errors"},
     # the spec, and what reads only it
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
@@ -55,9 +56,11 @@ ALLOWED = {
     | {"emit", "filters", "fixed", "generate", "geometry", "ir", "logs", "native", "reference", "scalars", "simulate"}
     | {"status"},
     "layouts": {"emit"},
+    "difference": SPEC | {"generate", "geometry", "logs", "native"},
+    "tools": {"__init__", "errors", "native"},
     "commands": SPEC
-    | {"advice", "check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference"}
-    | {"seal", "selftest", "simulate", "status"},
+    | {"advice", "check", "cost", "difference", "examples", "files", "generate", "layouts", "logs", "native"}
+    | {"override", "plot", "reference", "seal", "selftest", "simulate", "status", "tools"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
     "__main__": {"cli"},
