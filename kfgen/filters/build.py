@@ -243,6 +243,8 @@ def _with_tables(code: FilterCode) -> FilterCode:
             stack = list(reversed(roots(statement)))
             while stack:
                 node = stack.pop()
+                if node.op == "variable" or node.op == "const":
+                    continue
                 data = node.data
                 if isinstance(data, Table):
                     found.setdefault(data, f"table{len(found)}")

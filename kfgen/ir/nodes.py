@@ -97,7 +97,8 @@ class Pool:
         key = (op, args, data, kind)
         found = self._nodes.get(key)
         if found is None:
-            volatile = volatile or any(a.volatile for a in args)
+            for a in args:
+                volatile = volatile or a.volatile
             found = self._nodes[key] = Node(op, args, data, kind, self._count, volatile)
             self._count += 1
             self._was_made(key, found)

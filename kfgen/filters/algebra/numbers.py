@@ -20,7 +20,9 @@ Number = Any  # a Value, or a Python or numpy number
 
 def is_zero(a: Number) -> bool:
     """Structurally zero."""
-    return bool(a.constant == 0) if isinstance(a, Value) else bool(a == 0)
+    if isinstance(a, Value):
+        return a.node.op == "const" and not a.node.data
+    return bool(a == 0)
 
 
 def is_constant(a: Number) -> bool:
