@@ -207,3 +207,32 @@ def test_variances_far_above_the_noise(form):
                 assert kf.update(name, z) < ERROR, (how, k)
                 assert np.all(kf.P.diagonal() >= 0.0), (how, k)
             assert abs(kf.x[0] - 15.0) < 0.1, how
+
+
+WEAK = """
+kfgen: 1
+name: weak
+scalar: double
+dt: 0.1
+states: {a: {init: 0.5, std: 1.8}, b: {init: -1, std: 3}, c: {init: 0.3, std: 1.5}, d: {init: 1, std: 2.8}}
+covariances: [[a, b, 4.9], [a, c, 1.1], [b, c, 2.5], [a, d, -4.4], [b, d, -8], [c, d, -2.2]]
+dynamics: {f: {a: a + dt*b}, Q: {a: 0.01, b: 0.01, c: 0.01, d: 0.01}}
+measurements: {SENSORS}
+filter: {type: ukf}
+"""
+
+
+@pytest.mark.parametrize("last", ["-2*b + 0.5*c + 0.2*tanh(b - d)", "c*d + d", "b + 1e-3*a*c"])
+def test_what_rounding_leaves_of_a_slope_is_none(last):
+    """An exact component after another: its slopes by regression are round-off where h does not have the state, and
+    may not drown what is known of it."""
+    sensors = [f"{{p: {{h: a, std: 0.1}}, q: {{h: b + 0.5*c, std: 1}}, r: {{h: '{last}', std: 0*(1 + a**2)}}}}"]
+    for how, spec, name, kf in each_alone(seeing(WEAK, sensors, "sequential")):
+        ref = reference(spec)
+        for k in range(4):
+            z = [0.4 + 0.1 * k, -0.8, 1.7]
+            assert kf.update(name, z) == ref.update(name, z) == 0, how
+            sigma = np.sqrt(ref.P.diagonal())
+            assert np.abs((kf.x - ref.x) / sigma).max() < 1e-8, (how, k)
+            assert np.abs((kf.P - ref.P) / np.outer(sigma, sigma)).max() < 1e-8, (how, k)
+            assert kf.predict() == ref.predict() == 0
