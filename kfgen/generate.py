@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -36,18 +36,21 @@ class Summary:
     rows: list[tuple[str, dict[str, int]]]
     ram: int
     notes: list[str]
-    prediction: Prediction | None = None
-    forms: Mapping[str, str] = field(default_factory=dict)
+    prediction: Prediction
+    forms: Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class Generated:
-    """The files of a filter, what they cost, and the program they were printed from."""
+    """The files of a filter, and the program they were printed from. real: the program before it was lowered to
+    integers; told: further remarks."""
 
     files: dict[str, str]
-    summary: Summary
     code: FilterCode
     view: View
+    scalar: Scalar
+    real: FilterCode
+    told: Sequence[str] = ()
     fixed: FixedFilter | None = None
     history: HistoryView | None = None
 
@@ -55,6 +58,16 @@ class Generated:
     def spec(self) -> Spec:
         """The spec as it was generated, its scalar with it."""
         return self.code.model.spec
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """What the filter will take of a Cortex-M4F."""
+        return _predicted(self.code, self.scalar, self.view)
+
+    @cached_property
+    def summary(self) -> Summary:
+        """What the build table shows."""
+        return _summary(self.real, self.view.ram, self.prediction, self.told)
 
     @cached_property
     def declarations(self) -> Declarations:
@@ -89,10 +102,11 @@ def _built(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Genera
         raise SpecError.at(
             place, f"{spec.scalar} cannot carry the model: {error}", "use double, or other units"
         ) from None
-    prediction = _predicted(spec, code, SCALARS[spec.scalar], view, judge)
-    told = replace(summary(code, view), prediction=prediction)
     history = history_view(code, view, SCALARS[spec.scalar])
-    return Generated(_rendered(view, history), _with_past(told, history), code, view, None, history)
+    made = Generated(
+        _rendered(view, history), code, view, SCALARS[spec.scalar], code, _past(history), history=history
+    )  # fmt: skip
+    return _judged(made, judge)
 
 
 def _rendered(view: View, history: HistoryView | None) -> dict[str, str]:
@@ -101,20 +115,25 @@ def _rendered(view: View, history: HistoryView | None) -> dict[str, str]:
     return {name: sealed(name, text) for name, text in texts.items()}
 
 
-def _with_past(told: Summary, history: HistoryView | None) -> Summary:
-    if history is not None:
-        told.notes.append(f"history of {history.steps} steps: {history.ram} bytes of RAM, the filter's own in it")
-    return told
+def _past(history: HistoryView | None) -> list[str]:
+    if history is None:
+        return []
+    return [f"history of {history.steps} steps: {history.ram} bytes of RAM, the filter's own in it"]
 
 
-def _predicted(spec: Spec, code: FilterCode, scalar: Scalar, view: View, judge: bool) -> Prediction:
-    """Held against the spec's budgets, if they are to be judged."""
+def _predicted(code: FilterCode, scalar: Scalar, view: View) -> Prediction:
     routines = () if view.routines is None else (*view.routines.ops, *view.routines.own)
-    prediction = predict(spec, code, scalar, view.ram, routines)
-    mistakes = exceeded(spec, prediction)
-    if judge and mistakes:
-        raise SpecError(mistakes)
-    return prediction
+    return predict(code.model.spec, code, scalar, view.ram, routines)
+
+
+def _judged(made: Generated, judge: bool) -> Generated:
+    """The same, held against the spec's budgets, if it has any and they are to be judged."""
+    code = made.spec.code
+    if judge and (code.flash, code.ram, code.stack) != (None, None, None):
+        mistakes = exceeded(made.spec, made.prediction)
+        if mistakes:
+            raise SpecError(mistakes)
+    return made
 
 
 def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Generated:
@@ -123,13 +142,12 @@ def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Genera
     logs = [each for each in (_named(spec), log) if each is not None]
     result = build_fixed(real, scalar, logs)
     view = make_view(result.code, scalar, overridden, result.view)
-    told = replace(summary(real, view), prediction=_predicted(spec, result.code, scalar, view, judge))
-    if spec.code.unroll == "none":
-        told.notes.append(UNROLLED)
-    told.notes.extend(result.told)
-    told.notes.extend(["value of raw 1, range, head-room:", *(f"  {line}" for line in result.view.table)])
     history = history_view(result.code, view, scalar)
-    return Generated(_rendered(view, history), _with_past(told, history), result.code, view, result, history)
+    told = [UNROLLED] if spec.code.unroll == "none" else []
+    told += [*_past(history), *result.told, "value of raw 1, range, head-room:"]
+    told += [f"  {line}" for line in result.view.table]
+    made = Generated(_rendered(view, history), result.code, view, scalar, real, told, result, history)
+    return _judged(made, judge)
 
 
 def _named(spec: Spec) -> Log | None:
@@ -146,13 +164,11 @@ def _named(spec: Spec) -> Log | None:
     raise SpecError.at(spec.fixed.log_place, f"the log {path} cannot be read: {reason}", "name a log of this filter")
 
 
-def summary(code: FilterCode, view: View) -> Summary:
-    """What the build table shows of a filter."""
+def _summary(code: FilterCode, ram: int, prediction: Prediction, told: Sequence[str]) -> Summary:
     rows = []
     for function in code.functions:
-        counts = operations(function.body)
         if function.name == "predict" or function.name.startswith("update_"):
-            rows.append((function.name, counts or {}))
+            rows.append((function.name, operations(function.body) or {}))
     notes = [code.description]
     if code.order != tuple(range(len(code.order))):
         notes.append("inner order: " + " ".join(code.model.errors[i] for i in code.order))
@@ -160,8 +176,8 @@ def summary(code: FilterCode, view: View) -> Summary:
         inner = " ".join(code.model.errors[i] for i in mode.order)
         order = "" if mode.order == code.order else f"; inner order: {inner}"
         notes.append(f"{mode.name}: {mode.description}{order}")
-    notes += code.remarks
-    return Summary(rows, view.ram, notes, None, code.forms)
+    notes += [*code.remarks, *told]
+    return Summary(rows, ram, notes, prediction, code.forms)
 
 
 def generate(spec: Spec, scalar: str | None = None) -> dict[str, str]:

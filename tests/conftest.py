@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,13 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # the default walks a heap full of expressions thousands of times and finds next to nothing
 gc.set_threshold(100_000, 20, 10)
+
+
+def pytest_configure() -> None:
+    from kfgen.spec import loading
+
+    # of what tests load they have loaded half before; a spec is frozen
+    loading._loads = lru_cache(maxsize=1000)(loading._loads)
 
 
 def pytest_collection_finish() -> None:

@@ -49,11 +49,12 @@ static bool battery_finite(float a)
     return (view.bits & exponent) != exponent;
 }
 
-/* the segment of a table in which a lies: 0 before the first of n points, n from the last one on */
+/* the segment of a table in which a lies: 0 before the first of n points, n beyond the last one */
 static int battery_segment(float a, const float x[], int n)
 {
     int i = 0;
     while (i < n && BATTERY_at(x, i + 1) <= a) { i++; }
+    if (i == n && !(BATTERY_at(x, n) < a)) { i--; }
     return i;
 }
 
@@ -167,57 +168,58 @@ battery_status_t battery_update_terminal(battery_t *kf,
     const float d_v_slow = kf->D[2];
     const float t4 = h_voltage_soc * (d_soc * h_voltage_soc) + t2 * (d_v_fast * t2)
         + t3 * (d_v_slow * t3);
-    const bool t5 = !(2.861023e-6f * (h_voltage_soc * h_voltage_soc
+    const float t5 = h_voltage_soc * h_voltage_soc
         * (d_soc + u_soc_v_fast * d_v_fast * u_soc_v_fast + u_soc_v_slow * d_v_slow * u_soc_v_slow)
-        + d_v_fast + u_v_fast_v_slow * d_v_slow * u_v_fast_v_slow + d_v_slow) < t4) && t1 <= 0.0f
-        && !(t4 < 0.0f);
-    const float t6 = t5 ? 0.0f : h_voltage_soc;
-    const float t7 = t5 ? 0.0f : -1.0f;
-    const float t8 = d_soc * t6;
-    const float t9 = t1 + t6 * t8;
-    const bool t10 = t9 > 1.1754944e-38f;
-    const float t11 = t10 ? 1.0f / t9 : 0.0f;
-    const float t12 = t8 * t11;
-    const float d_soc_next = d_soc * (t10 ? t1 * t11 : 1.0f);
-    const float t13 = u_soc_v_fast * t6 + t7;
-    const float t14 = d_v_fast * t13;
-    const float t15 = t9 + t13 * t14;
-    const bool t16 = t15 > 1.1754944e-38f;
-    const float t17 = t16 ? 1.0f / t15 : 0.0f;
-    const float t18 = t14 * t17;
-    const float d_v_fast_next = d_v_fast * (t16 ? t9 * t17 : 1.0f);
-    const float u_soc_v_fast_next = u_soc_v_fast - t13 * t12;
-    const float t19 = t12 + t18 * u_soc_v_fast_next;
-    const float t20 = u_soc_v_slow * t6 + u_v_fast_v_slow * t7 + t7;
-    const float t21 = d_v_slow * t20;
-    const float s_voltage = t15 + t20 * t21;
-    const bool t22 = s_voltage > 1.1754944e-38f;
-    const float t23 = 1.0f / s_voltage;
-    const float t24 = t22 ? t23 : 0.0f;
-    const float t25 = t21 * t24;
-    const float d_v_slow_next = d_v_slow * (t22 ? t15 * t24 : 1.0f);
-    const float u_v_fast_v_slow_next = u_v_fast_v_slow - t20 * t18;
-    const float u_soc_v_slow_next = u_soc_v_slow - t20 * t19;
-    const float nis = s_voltage > 0.0f ? y_voltage * (y_voltage * t23) : 0.0f;
+        + d_v_fast + u_v_fast_v_slow * d_v_slow * u_v_fast_v_slow + d_v_slow;
+    const bool t6 = !(2.861023e-6f * t5 < t4) && t1 <= 0.0f && !(t4 < 0.0f);
+    const float least_voltage = 8.185452e-12f * t5 + 1.1754944e-38f;
+    const float t7 = t6 ? 0.0f : h_voltage_soc;
+    const float t8 = t6 ? 0.0f : -1.0f;
+    const float t9 = d_soc * t7;
+    const float t10 = t1 + t7 * t9;
+    const bool t11 = least_voltage < t10;
+    const float t12 = t11 ? 1.0f / t10 : 0.0f;
+    const float t13 = t9 * t12;
+    const float d_soc_next = d_soc * (t11 ? t1 * t12 : 1.0f);
+    const float t14 = u_soc_v_fast * t7 + t8;
+    const float t15 = d_v_fast * t14;
+    const float t16 = t10 + t14 * t15;
+    const bool t17 = least_voltage < t16;
+    const float t18 = t17 ? 1.0f / t16 : 0.0f;
+    const float t19 = t15 * t18;
+    const float d_v_fast_next = d_v_fast * (t17 ? t10 * t18 : 1.0f);
+    const float u_soc_v_fast_next = u_soc_v_fast - t14 * t13;
+    const float t20 = t13 + t19 * u_soc_v_fast_next;
+    const float t21 = u_soc_v_slow * t7 + u_v_fast_v_slow * t8 + t8;
+    const float t22 = d_v_slow * t21;
+    const float s_voltage = t16 + t21 * t22;
+    const bool t23 = least_voltage < s_voltage;
+    const float t24 = 1.0f / s_voltage;
+    const float t25 = t23 ? t24 : 0.0f;
+    const float t26 = t22 * t25;
+    const float d_v_slow_next = d_v_slow * (t23 ? t16 * t25 : 1.0f);
+    const float u_v_fast_v_slow_next = u_v_fast_v_slow - t21 * t19;
+    const float u_soc_v_slow_next = u_soc_v_slow - t21 * t20;
+    const float nis = s_voltage > 0.0f ? y_voltage * (y_voltage * t24) : 0.0f;
 
     /* state and innovation squared */
-    const float soc_next = soc + (t19 + t25 * u_soc_v_slow_next) * y_voltage;
-    const float v_fast_next = v_fast + (t18 + t25 * u_v_fast_v_slow_next) * y_voltage;
-    const float v_slow_next = v_slow + t25 * y_voltage;
-    const float t26 = soc_next < 0.0f ? 0.0f : (soc_next > 1.0f ? 1.0f : soc_next);
+    const float soc_next = soc + (t20 + t26 * u_soc_v_slow_next) * y_voltage;
+    const float v_fast_next = v_fast + (t19 + t26 * u_v_fast_v_slow_next) * y_voltage;
+    const float v_slow_next = v_slow + t26 * y_voltage;
+    const float t27 = soc_next < 0.0f ? 0.0f : (soc_next > 1.0f ? 1.0f : soc_next);
 
     /* guards */
     if (!battery_finite(y_voltage + t1 + h_voltage_soc)) { return BATTERY_NOT_FINITE; }
     if (t1 < 0.0f) { /* a measurement variance is negative */
         return BATTERY_NOT_POSITIVE;
     }
-    if (!battery_finite(y_voltage + t26 + v_fast_next + v_slow_next + nis + soc_next + s_voltage)) {
+    if (!battery_finite(y_voltage + t27 + v_fast_next + v_slow_next + nis + soc_next + s_voltage)) {
         return BATTERY_NOT_FINITE;
     }
     if (s_voltage < 0.0f) { return BATTERY_NOT_POSITIVE; }
 
     /* store */
-    kf->x[BATTERY_SOC] = t26;
+    kf->x[BATTERY_SOC] = t27;
     kf->x[BATTERY_V_FAST] = v_fast_next;
     kf->x[BATTERY_V_SLOW] = v_slow_next;
     kf->U[0] = u_soc_v_fast_next;
@@ -307,4 +309,4 @@ void battery_get_covariance(const battery_t *kf, battery_real_t P[9])
         }
     }
 }
-/* kfgen: body bdbd651582388cebcaca71f67bb38c35 */
+/* kfgen: body 00596347d422f921edac3cd07ae079b3 */

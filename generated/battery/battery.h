@@ -12,7 +12,7 @@
  *
  * RAM 40 bytes a filter. Operations:
  *   predict          33 mul, 23 add, 3 div, 2 compare, 2 select
- *   update_terminal  49 mul, 38 add, 3 div, 11 compare, 11 select, 1 slope, 1 table
+ *   update_terminal  50 mul, 39 add, 3 div, 11 compare, 11 select, 1 slope, 1 table
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
  * 6b2a56f7d06d944fc4838eb90bda663064251cf3893ba9c8b011eb1467f19d7a
@@ -101,7 +101,7 @@ battery_status_t battery_predict(battery_t *kf, const battery_inputs_t *u);
  * @param u   current [A]
  * @return BATTERY_OK, or an error that leaves *kf as it was
  *
- * 49 mul, 38 add, 3 div, 11 compare, 11 select, 1 slope, 1 table.
+ * 50 mul, 39 add, 3 div, 11 compare, 11 select, 1 slope, 1 table.
  */
 battery_status_t battery_update_terminal(battery_t *kf,
                                          const battery_terminal_t *z,
@@ -138,4 +138,4 @@ void battery_get_covariance(const battery_t *kf, battery_real_t P[9]);
 #endif
 
 #endif
-/* kfgen: body 6577cbc6581f8230251214e7c2614a64 */
+/* kfgen: body e9af3aad7d7c9e739afac66566c16406 */

@@ -20,10 +20,9 @@ LARGE, TENTH = 32 * 1024, 10
 
 def cheaper(spec: Spec, generated: Generated) -> Iterator[Advice]:
     """Advice on the form of the covariance, and on loops, by operation counts and predicted flash."""
-    prediction = generated.summary.prediction
-    if generated.fixed is not None or prediction is None:
+    if generated.fixed is not None:
         return
-    flash, code = prediction.totals["flash"], spec.code
+    flash, code = generated.summary.prediction.totals["flash"], spec.code
     undecided = code.unroll == "auto" and not code.unroll_by and code.flash is None
     loops = list(_loops(spec, flash)) if flash > LARGE and undecided and "loops" not in spec.advice else []
     yield from loops
@@ -35,7 +34,7 @@ def cheaper(spec: Spec, generated: Generated) -> Iterator[Advice]:
 
 def _loops(spec: Spec, flash: int) -> Iterator[Advice]:
     other = _built(replace(spec, code=replace(spec.code, unroll="none")))
-    least = None if other is None or other.summary.prediction is None else other.summary.prediction.totals["flash"]
+    least = None if other is None else other.summary.prediction.totals["flash"]
     if least is not None and least * TENTH <= flash:
         text = f"about {flash} bytes of straight-line code, of which loops need about {least}"
         yield Advice(spec.place, text, "write `code: {unroll: none}`, or a budget, `code: {flash: ..}`", "loops")

@@ -57,7 +57,8 @@ def _unseen(tracks: Sequence[Track]) -> Array:
     rows = rows[finite]
     seen = length > 1e-13 * limit
     n = len(length)
-    _, values, right = np.linalg.svd(rows[:, seen] / length[seen])
+    scaled = rows[:, seen] / length[seen]
+    _, values, right = np.linalg.svd(scaled, full_matrices=scaled.shape[0] < scaled.shape[1])
     rank = int(np.count_nonzero(values > RANK * max(float(values.max(initial=0.0)), 1.0)))
     null = np.zeros((n, int(seen.sum()) - rank))
     null[seen] = right[rank:].T / length[seen][:, None]

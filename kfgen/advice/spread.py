@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kfgen.advice.track import Track
+from kfgen.advice.track import Array, Track
 from kfgen.errors import Advice, Place
+from kfgen.reference.carried import carried_by_process, carried_by_sensor, wrapped_by_process, wrapped_by_sensor
+from kfgen.reference.model import Model
 from kfgen.reference.sigma_points import SigmaRule
 from kfgen.scalar_names import FLOAT
+from kfgen.spec.advice.usage import closure
 from kfgen.spec.problems import short
+from kfgen.spec.tree import names
 from kfgen.spec.types import Sensor, Spec
 
 REACH = 2.0**24  # of a float: a variance that an update makes smaller by more is all round-off
@@ -46,18 +49,49 @@ def _places(sensor: Sensor) -> dict[str, Place]:
 
 
 def _angles(track: Track) -> Iterator[Advice]:
-    points = track.spec.filter.sigma_points
-    if points is None:
+    """Images that are wrapped, since f or h is not linear, and of which some points would come round from behind."""
+    model, spec = track.model, track.spec
+    if spec.filter.sigma_points is None:
         return
-    reach = float(np.abs(SigmaRule(track.model).points(track.model.n).offsets).max())
-    for state in track.spec.states:
-        if state.kind != "angle":
-            continue
-        i = track.model.row[state.name]
-        std = math.sqrt(max(float(track.model.P0[i, i]), 0.0))
-        if reach * std <= math.pi:
-            continue
-        place = state.variance.place if state.variance is not None else state.place
-        text = f"the sigma points of {short(state.name)} lie {reach * std:.2g} rad from the mean, more than half a turn"
-        cure = f"choose a smaller alpha, or a std of at most {math.pi / reach:.2g}"
-        yield Advice(place, text, cure, "sigma_angle")
+    carried = len(carried_by_process(model))
+    std = np.sqrt(np.maximum(np.diag(model.P0), 0.0))
+    image = _deviations(track.F[0], model.P0)
+    for i in wrapped_by_process(model):
+        state, own = spec.states[i], spec.dynamics.f.get(spec.states[i].name)
+        moved = own is not None and state.name in closure(names(own.tree), spec.let)
+        place = state.variance.place if moved and state.variance is not None else own.place if own else state.place
+        row = model.row[spec.states[i].name]
+        reach = _reach(model, carried) * max(float(image[row]), float(std[row]) if moved else 0.0)
+        yield from _beyond(reach, model.periods[i], f"of {short(state.name)}", "f", place, moved)
+    for sensor in spec.measurements:
+        seen, carried = _deviations(track.H[sensor.name][0], model.P0), len(carried_by_sensor(model, sensor))
+        for i in wrapped_by_sensor(model, sensor):
+            component = sensor.components[i]
+            if component.period is not None:
+                before = {each.name for each in sensor.components[:i]}
+                row = i - sum(rotation.parts[0] in before for rotation in sensor.rotations)  # 3 errors of 4 numbers
+                reach, what = _reach(model, carried) * float(seen[row]), f"seen as {short(component.name)}"
+                yield from _beyond(reach, model.number(component.period), what, "its h", component.h.place, False)
+
+
+def _reach(model: Model, carried: int) -> float:
+    """How many standard deviations the points of a state lie from its mean."""
+    rule = SigmaRule(model)
+    return float(np.abs(rule.points(model.n if rule.own else model.n + carried).offsets).max())
+
+
+def _deviations(J: Array, P: Array) -> Array:
+    """Standard deviations of J x."""
+    variances: Array = np.einsum("ij,jk,ik->i", J, P, J)
+    return np.sqrt(np.maximum(variances, 0.0))
+
+
+def _beyond(reach: float, period: float, what: str, formula: str, place: Place, own: bool) -> Iterator[Advice]:
+    if reach <= period / 2:
+        return
+    text = (
+        f"the sigma points {what} lie {reach:.2g} from the mean, more than half a turn ({period / 2:.3g}), and "
+        f"{formula} is not linear: they are wrapped, and the variance is too small"
+    )
+    cure = "choose a smaller alpha, or a smaller std" if own else "choose a smaller alpha, or smaller deviations"
+    yield Advice(place, text, cure, "sigma_angle")

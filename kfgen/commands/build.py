@@ -230,15 +230,13 @@ def report(built: Sequence[Built]) -> list[Part]:
     for each in built:
         name, summary = each.spec.name, each.generated.summary
         forms, found = summary.forms, summary.prediction
-        flash, stack = (found.flash, found.stack) if found is not None else ({}, {})
         filters.append((name, each.spec.scalar, _sizes(each.spec), f"{summary.ram} B"))
         for function, counts in summary.rows:
             operations = _operations(counts) if counts or function not in forms else ""
-            about = (_about(flash.get(function)), _about(stack.get(function)))
+            about = (_about(found.flash.get(function)), _about(found.stack.get(function)))
             functions.append((name, _with_form(function, forms), *about, operations))
         notes += [(name, note) for note in summary.notes]
-        if found is not None:
-            notes.append((name, _predicted(each.spec, found.totals)))
+        notes.append((name, _predicted(each.spec, found.totals)))
     files = [str(path) for each in built for path in each.files]
     return [Table(filters, right=(3,)), "", Table(functions, right=(2, 3)), "", Notes(notes), "", Paths(files)]
 

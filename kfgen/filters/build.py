@@ -252,9 +252,12 @@ def _with_tables(code: FilterCode) -> FilterCode:
             stack = list(reversed(roots(statement)))
             while stack:
                 node = stack.pop()
-                if isinstance(node.data, Table):
-                    found.setdefault(node.data, f"table{len(found)}")
-                if isinstance(node.data, Constants) and node.data not in lookups:
-                    lookups[node.data] = unused(node.data.name, set(lookups.values()))
-                stack += reversed(node.args)
+                if node.op == "variable" or node.op == "const":
+                    continue
+                data = node.data
+                if isinstance(data, Table):
+                    found.setdefault(data, f"table{len(found)}")
+                elif isinstance(data, Constants) and data not in lookups:
+                    lookups[data] = unused(data.name, set(lookups.values()))
+                stack += node.args[::-1]
     return replace(code, tables=found, lookups=lookups)

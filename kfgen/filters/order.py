@@ -90,16 +90,15 @@ def _cost(order: list[int], columns: list[set[int]], noisy: set[int], measured: 
         for i in columns[state]:
             reach |= 1 << position[i]
         w = reach  # column k of F U: all columns up to k, U being full above
-        for j in reversed(range(n)):
-            if not w >> j & 1:
-                continue
+        while w:
+            j = w.bit_length() - 1
             below = (1 << j) - 1
             touched = (w | U[j]) & below
-            fresh = touched & ~U[j]
-            total += PIVOT + ELEMENT * (touched & U[j]).bit_count() + FRESH * fresh.bit_count()
+            again = touched & U[j]
+            total += PIVOT + ELEMENT * again.bit_count() + FRESH * (touched ^ again).bit_count()
             U[j] = touched
             if not D[j]:
                 D[j] = True
                 break
-            w = (w & ~(1 << j)) | touched
+            w = touched  # what is left of w is among it
     return total

@@ -38,25 +38,27 @@ def _tally(body: list[Statement], times: int, counts: Counter[str]) -> bool:
             continue
         if isinstance(statement, Call) and not _tally(statement.callee.body, times, counts):
             return False
-        once: Counter[str] = Counter()
-        for root in roots(statement):
-            _count(root, once)
-        for op, count in once.items():
-            counts[op] += count * times
+        _count(roots(statement), times, counts)
     return True
 
 
-def _count(node: Node, counts: Counter[str]) -> None:
-    if node.kind != "int":
-        if node.op == "sum":
-            counts["add"] += len(node.data) - 1
-            counts["mul"] += sum(1 for _, factors in node.data if factors == 2)
-        elif node.op in ("add", "sub", "q_add", "q_sub"):
-            counts["add"] += 1
-        elif node.op in ("q_madd", "q_fma", "q_mac"):
-            counts["add"] += 1
-            counts["mul"] += 1
-        elif node.op not in _FREE and node.op not in _SILENT:
-            counts[_NAMES.get(node.op, node.op.removeprefix("q_"))] += 1
-    for argument in node.args:
-        _count(argument, counts)
+def _count(stack: list[Node], times: int, counts: Counter[str]) -> None:
+    while stack:
+        node = stack.pop()
+        op = node.op
+        if op == "variable" or op == "const":
+            continue
+        stack += node.args
+        if node.kind == "int" or op in _FREE:
+            continue
+        if op == "sum":
+            counts["add"] += times * (len(node.data) - 1)
+            counts["mul"] += times * sum([factors == 2 for _, factors in node.data])
+        elif op in ("add", "sub", "q_add", "q_sub"):
+            counts["add"] += times
+        elif op in ("q_madd", "q_fma", "q_mac"):
+            counts["add"] += times
+            counts["mul"] += times
+        elif op not in _SILENT:
+            counts[_NAMES.get(op, op.removeprefix("q_"))] += times
+

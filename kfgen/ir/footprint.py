@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from weakref import WeakKeyDictionary
 
 from kfgen.ir import sizes
 from kfgen.ir.nodes import BOOL, INT, Node
@@ -45,8 +46,18 @@ class Traits:
         return Counter({f"{kind}, looped" if self.looped else kind: n for kind, n in self.counts.items()})
 
 
+_KNOWN: WeakKeyDictionary[Function, Traits] = WeakKeyDictionary()
+
+
 def traits(function: Function) -> Traits:
     """What a function is made of."""
+    found = _KNOWN.get(function)
+    if found is None:
+        found = _KNOWN[function] = _traits(function)
+    return found
+
+
+def _traits(function: Function) -> Traits:
     found = Traits()
     counts = found.counts
     counts["function"] = 1
@@ -166,7 +177,14 @@ def _liveness(body: list[Statement], found: Traits) -> None:
 
 def crowded(functions: Iterable[Function]) -> bool:
     """Whether so many numbers are needed at once that gcc's schedulers do harm (measured: up to 26 % of the flash)."""
-    return sum(traits(function).spilled for function in functions) >= CROWDED
+    found = list(functions)
+    most = sum(max(0, _named(function) - REGISTERS) for function in found)
+    return most >= CROWDED and sum(traits(function).spilled for function in found) >= CROWDED
+
+
+def _named(function: Function) -> int:
+    """Constant locals in its text: no more can be needed at once."""
+    return sum(1 for statement in walk(function.body) if isinstance(statement, Let))
 
 
 def _bytes(found: Traits, table: Mapping[str, float]) -> float:

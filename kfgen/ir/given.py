@@ -21,7 +21,7 @@ def given(statements: Iterable[Statement]) -> set[str]:
         stack: list[Node] = roots(statement)
         while stack:
             node = stack.pop()
-            if id(node) not in seen:
+            if node.op != "const" and id(node) not in seen:
                 seen.add(id(node))
                 if node.op == "field" and str(node.data).startswith(GIVEN):
                     found.add(node.data)

@@ -36,6 +36,9 @@ class Memory:
     numbers: dict[str, Any] = field(default_factory=dict)
 
 
+_READ = {"const", "field", "element", "read", "real", "lookup", "bit", "half", "select", "and", "or"}
+
+
 class _Return(Exception):  # noqa: N818 - it is control flow, not an error
     def __init__(self, status: str) -> None:
         self.status = status
@@ -45,7 +48,8 @@ def run(function: Function, scalar: Scalar, memory: Memory) -> set[str]:
     """Execute a function; returns the names of the status flags (empty: OK)."""
     machine = _Machine(scalar, memory)
     try:
-        machine.block(function.body)
+        with scalar.quiet():
+            machine.block(function.body)
     except _Return as result:
         return {result.status} - {"OK"}  # an error comes alone, and so does a refusal: nothing has been done
     return machine.flags
@@ -127,11 +131,24 @@ class _Machine:
             self.memory.arrays[store.name][self.value(store.index)] = value
 
     def value(self, node: Node) -> Any:
+        op = node.op
+        if op == "variable" or op == "counter":
+            return self.locals[node.data]
+        if op in _READ:
+            return self.read(node)
+        args = [self.value(a) for a in node.args]
+        if node.kind == "int" and op in ("add", "sub", "mul"):
+            a, b = args
+            return a + b if op == "add" else a - b if op == "sub" else a * b
+        if op in ("lt", "le") and node.args[0].kind == "int":
+            return args[0] < args[1] if op == "lt" else args[0] <= args[1]
+        return self.scalar.evaluate(op, node.data, args)
+
+    def read(self, node: Node) -> Any:
+        """What is no operation on all arguments."""
         match node.op:
             case "const":
                 return self.constant(node)
-            case "variable" | "counter":
-                return self.locals[node.data]
             case "field":
                 return self.memory.numbers[node.data]
             case "element":
@@ -156,13 +173,7 @@ class _Machine:
                 return self.value(node.args[0]) and self.value(node.args[1])
             case "or":
                 return self.value(node.args[0]) or self.value(node.args[1])
-        args = [self.value(a) for a in node.args]
-        if node.kind == "int" and node.op in ("add", "sub", "mul"):
-            a, b = args
-            return a + b if node.op == "add" else a - b if node.op == "sub" else a * b
-        if node.op in ("lt", "le") and node.args[0].kind == "int":
-            return args[0] < args[1] if node.op == "lt" else args[0] <= args[1]
-        return self.scalar.evaluate(node.op, node.data, args)
+        raise KeyError(node.op)
 
     def constant(self, node: Node) -> Any:
         value: Fraction = node.data

@@ -23,7 +23,7 @@ REAL, BOOL, INT = "real", "bool", "int"
 class Table:
     """A piecewise linear function through n points, abscissae ascending, constant beyond the ends.
 
-    It has n + 1 segments: before the first point, between points, from the last point on.
+    It has n + 1 segments: before the first point, between points, beyond the last one. An end belongs to the inside.
     """
 
     x: tuple[Fraction, ...]
@@ -97,7 +97,8 @@ class Pool:
         key = (op, args, data, kind)
         found = self._nodes.get(key)
         if found is None:
-            volatile = volatile or any(a.volatile for a in args)
+            for a in args:
+                volatile = volatile or a.volatile
             found = self._nodes[key] = Node(op, args, data, kind, self._count, volatile)
             self._count += 1
             self._was_made(key, found)

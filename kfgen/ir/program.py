@@ -125,9 +125,9 @@ class Argument:
     optional: bool = False  # may be NULL
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False, weakref_slot=True)
 class Function:
-    """An emitted function: its body is scheduled (every shared value has its Let)."""
+    """An emitted function: its body is scheduled (every shared value has its Let), and is not changed any more."""
 
     name: str
     arguments: list[Argument]
@@ -192,5 +192,5 @@ def walk(body: list[Statement]) -> Iterator[Statement]:
     """Every statement, those inside loops included."""
     for statement in body:
         yield statement
-        if isinstance(statement, For | If):
+        if isinstance(statement, (For, If)):  # a tuple, for the speed
             yield from walk(statement.body)

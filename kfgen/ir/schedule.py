@@ -72,12 +72,12 @@ class _Scheduler:
                 first = next((i for i, (s, _) in enumerate(terms) if s > 0), 0)
                 terms.insert(0, terms.pop(first))
             if len(terms) <= MAX_TERMS:
-                args = tuple(self._operand(f) for _, factors in terms for f in factors)
-                data = tuple((s, len(factors)) for s, factors in terms)
+                args = tuple([self._operand(f) for _, factors in terms for f in factors])
+                data = tuple([(s, len(factors)) for s, factors in terms])
                 result = Node("sum", args, data, node.kind, node.serial, node.volatile)
                 self.fused[node] = result
                 return result
-        args = tuple(self._operand(a) for a in node.args)
+        args = tuple([self._operand(a) for a in node.args])
         result = node if not args else Node(node.op, args, node.data, node.kind, node.serial, node.volatile)
         self.fused[node] = result
         return result

@@ -41,9 +41,10 @@ class Value:
         self.node = node
 
     def _binary(self, operation: str, a: Value | Number, b: Value | Number) -> Value:
-        t = self.trace
-        kind = self.node.kind
-        return t.wrapped(getattr(t.pool, operation)(t.node(a, kind), t.node(b, kind)))
+        t, kind = self.trace, self.node.kind
+        left = a.node if isinstance(a, Value) else t.node(a, kind)
+        right = b.node if isinstance(b, Value) else t.node(b, kind)
+        return Value(t, getattr(t.pool, operation)(left, right))
 
     def __add__(self, other: Value | Number) -> Value:
         return self._binary("add", self, other)

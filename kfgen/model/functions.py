@@ -139,7 +139,7 @@ class Table(KfFunction):
 
 
 class Slope(Less):
-    """The slope of a Table; 0 outside of it."""
+    """The slope of a Table; 0 outside of it, at its ends that of the segment inside."""
 
 
 def root(argument: Any) -> Any:

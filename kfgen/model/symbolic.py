@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
+from functools import reduce
+from operator import mul
 from typing import Any
 
 import sympy
@@ -67,11 +69,49 @@ def partials(expression: Any) -> tuple[tuple[Any, Any], ...]:
     """(symbol, derivative) for every symbol on which an expression depends, by name. Of a sum term by term, each by the
     symbols that it has: a sum of many terms in many symbols is seen once, not once a symbol."""
     found: dict[Any, list[Any]] = {}
+    slopes = _Slopes()
     for term in sympy.Add.make_args(expression):
-        for symbol in term.free_symbols:
-            found.setdefault(symbol, []).append(term.diff(symbol))
+        for symbol in slopes.symbols(term):
+            found.setdefault(symbol, []).append(slopes.of(term, symbol))
     pairs = ((s, sympy.Add(*found[s])) for s in sorted(found, key=lambda s: s.name))
     return tuple((s, d) for s, d in pairs if d != 0)
+
+
+class _Slopes:
+    """Derivatives by SymPy's own rules, but for its care about what else a symbol might be, which takes most of the
+    time; each part is asked only for the symbols that it has."""
+
+    def __init__(self) -> None:
+        self._symbols: dict[Any, frozenset[Any]] = {}
+
+    def symbols(self, e: Any) -> frozenset[Any]:
+        found = self._symbols.get(e)
+        if found is None:
+            found = frozenset({e}) if e.is_Symbol else frozenset().union(*map(self.symbols, e.args))
+            self._symbols[e] = found
+        return found
+
+    def of(self, e: Any, s: Any) -> Any:
+        """de/ds."""
+        if s not in self.symbols(e):
+            return sympy.S.Zero
+        if e == s:
+            return sympy.S.One
+        if e.is_Add:
+            return sympy.Add(*[self.of(a, s) for a in e.args])
+        if e.is_Mul:
+            slopes = [(i, self.of(a, s)) for i, a in enumerate(e.args)]
+            return sympy.Add(*[self._product(e.args, i, d) for i, d in slopes if d != 0])
+        if e.is_Pow and s not in self.symbols(e.exp):
+            return e * (self.of(e.base, s) * e.exp / e.base)
+        if isinstance(e, sympy.Function) and type(e)._eval_derivative is sympy.Function._eval_derivative:
+            slopes = [(i, self.of(a, s)) for i, a in enumerate(e.args, 1)]
+            return sympy.Add(*[e.fdiff(i) * d for i, d in slopes if d != 0])
+        return e.diff(s)
+
+    def _product(self, factors: tuple[Any, ...], i: int, slope: Any) -> Any:
+        """Of factors with the i-th replaced, two by two: all at once SymPy makes another expression of it."""
+        return reduce(mul, (*factors[:i], slope, *factors[i + 1 :]), sympy.S.One)
 
 
 def _power(base: Any, exponent: Any) -> Any:

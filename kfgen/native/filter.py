@@ -174,7 +174,7 @@ class NativeFilter:
 
     @property
     def Q(self) -> Array:
-        """The adapted process covariance [n, n] (`adapt_Q` only)."""
+        """The adapted process covariance [n, n] (`adapt_Q` only), per second where the spec's is."""
         return self.struct.get("get_Q", self.struct.units.P)
 
     @property

@@ -13,18 +13,21 @@ import numpy as np
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.linalg import symmetric
 from kfgen.reference.model import Context, Model
+from kfgen.reference.reading import adapted_names
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.spec.sensors import filter_of
 
 
 @dataclass(frozen=True)
 class Adapted:
-    """R: sensor -> (m, m), e: sensor -> (m) the residual after its last update; Q (n, n). Empty or None where
-    the spec does not adapt them. Without the covariances of noise inputs."""
+    """R: sensor -> (m, m), e: sensor -> (m) the residual after its last update; Q (n, n), per second where dt is given
+    at run time and the spec's Q is a constant times dt. Empty or None where the spec does not adapt them. Without the
+    covariances of noise inputs. dt: the last step's, at first the spec's."""
 
     R: Mapping[str, Matrix] = field(default_factory=dict)
     e: Mapping[str, Vector] = field(default_factory=dict)
     Q: Matrix | None = None
+    dt: float = 1.0
 
 
 NOTHING = Adapted()
@@ -39,11 +42,14 @@ class Adaptation:
         self._a = 0.0 if options.adapt_R is None else model.number(options.adapt_R)
         self._b = 0.0 if options.adapt_Q is None else model.number(options.adapt_Q)
         self.R, self.Q = options.adapt_R is not None, options.adapt_Q is not None
+        dt = model.spec.dt
+        self._rate = dt is not None and dt.run_time and "dt" in adapted_names(model.spec)
+        self._dt = model.number(dt.nominal) if dt is not None and self._rate else 1.0
 
     def initial(self) -> Adapted:
         """The spec's R and Q, which are constant, and no residuals."""
         model, adapted = self.model, NOTHING
-        context = Context(model.values, np.zeros(len(model.inputs)), 0.0, 0.0)
+        context = Context(model.values, np.zeros(len(model.inputs)), 0.0, 1.0)
         learnt = [s for s in model.spec.measurements if filter_of(model.spec.filter, s).adapt_R is not None]
         if learnt:
             sensors = [SensorModel(model, sensor) for sensor in learnt]
@@ -51,8 +57,15 @@ class Adaptation:
             adapted = replace(adapted, R=R, e={sensor.name: np.zeros(sensor.space.k) for sensor in sensors})
         if self.Q:
             Q = model.covariance(model.spec.dynamics.Q, model.errors)
-            adapted = replace(adapted, Q=symmetric(Q(model.environment(context, model.x0))))
+            adapted = replace(adapted, Q=symmetric(Q(model.environment(context, model.x0))), dt=self._dt)
         return adapted
+
+    def additive(self, adapted: Adapted, context: Context) -> Matrix | None:
+        """The Q (n, n) of a step; None where it is the spec's."""
+        return adapted.Q * context.dt if adapted.Q is not None and self._rate else adapted.Q
+
+    def after_step(self, adapted: Adapted, context: Context) -> Adapted:
+        return replace(adapted, dt=context.dt) if self._rate else adapted
 
     def noise(self, adapted: Adapted, reading: Reading, spread: Matrix) -> Matrix:
         """R (m, m) for an update: (1 - a) R + a (spread + e e^T), spread (k, k) = H P H^T of the components
@@ -76,6 +89,8 @@ class Adaptation:
         return replace(adapted, R={**adapted.R, name: R}, e={**adapted.e, name: e})
 
     def with_steps(self, adapted: Adapted, steps: Matrix) -> Adapted:
-        """Q <- (1 - b) Q + b sum of dx dx^T over the corrections (k, n) of an update's scalars."""
+        """Q <- (1 - b) Q + b sum of dx dx^T over the corrections (k, n) of an update's scalars; of a Q per second
+        divided by the last step."""
         assert adapted.Q is not None
-        return replace(adapted, Q=symmetric((1.0 - self._b) * adapted.Q + self._b * steps.T @ steps))
+        learnt = steps.T @ steps / adapted.dt if self._rate else steps.T @ steps
+        return replace(adapted, Q=symmetric((1.0 - self._b) * adapted.Q + self._b * learnt))

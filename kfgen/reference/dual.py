@@ -243,15 +243,15 @@ def maximum(a: Number, b: Number) -> Number:
 def table(x: Number, knots: Sequence[float], heights: Sequence[Number]) -> Number:
     """Piecewise linear through (knots, heights), clamped outside.
 
-    The slope at a knot is that of the segment to its right; at the last knot and outside it is 0.
+    The slope at a knot is that of the segment to its right, at the last knot to its left; outside it is 0.
     """
     v = value_of(x)
     if v != v:
         return math.nan
     if v < knots[0]:
         return heights[0]
-    if v >= knots[-1]:
+    if v > knots[-1]:
         return heights[-1]
-    i = bisect_right(knots, v) - 1
+    i = min(bisect_right(knots, v), len(knots) - 1) - 1
     slope = quotient(heights[i + 1] - heights[i], knots[i + 1] - knots[i])
     return heights[i] + (x - knots[i]) * slope

@@ -45,7 +45,7 @@ class Ekf(Algorithm):
 
     def transition(self, estimate: Estimate, context: Context) -> Transition:
         """The step of the state, its Jacobian, and what it adds to the covariance."""
-        return self.process.linearise(estimate.x, context, estimate.adapted.Q)
+        return self.process.linearise(estimate.x, context, self.adaptation.additive(estimate.adapted, context))
 
     def linearise(self, estimate: Estimate, reading: Reading) -> Linearisation:
         """The prediction of the reading, its Jacobian, and the covariance of its noise."""
@@ -57,7 +57,8 @@ class Ekf(Algorithm):
         F = transition.F
         P = symmetric(F @ estimate.P @ F.T + transition.Q)
         x, P, flags = self.limits.finish(transition.x, P, context)
-        return replace(estimate, x=x, P=P, memory=None), flags
+        adapted = self.adaptation.after_step(estimate.adapted, context)
+        return replace(estimate, x=x, P=P, memory=None, adapted=adapted), flags
 
     def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
         """y = z - h(x), S = H P H^T + R + M Re M^T; nis = y^T S^-1 y."""

@@ -49,6 +49,11 @@ def read_by_predict(spec: Spec) -> Names:
     return _closure(spec, formulas)
 
 
+def adapted_names(spec: Spec) -> Names:
+    """Names in the additive Q."""
+    return _closure(spec, _entries(spec.dynamics.Q))
+
+
 def read_by_update(spec: Spec, sensor: str, used: Sequence[int] | None = None) -> Names:
     """Names in h, R and own residuals of the components in use (None: all), in the noise inputs that these h contain,
     in the gate and in psi; of an imm of any mode."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from fractions import Fraction
 from typing import Any, Protocol
 
@@ -34,6 +35,10 @@ class Scalar(Protocol):
 
     def function(self, op: str) -> str:
         """The libm function of an operation."""
+        ...
+
+    def quiet(self) -> AbstractContextManager[object]:
+        """In which evaluating says nothing of results that are not finite."""
         ...
 
     def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:

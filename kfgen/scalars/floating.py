@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from fractions import Fraction
 from typing import Any
 
@@ -12,6 +13,11 @@ from kfgen import scalar_names
 
 _LIBM = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "floor",
          "atan2", "pow")  # fmt: skip
+
+
+def _power(exponent: int) -> Fraction:
+    """Of two."""
+    return Fraction(1 << exponent) if exponent >= 0 else Fraction(1, 1 << -exponent)
 
 
 class Floating:
@@ -33,6 +39,7 @@ class Floating:
         self.probability = Fraction(0)
         self._mantissa = info.nmant + 1
         self._smallest = int(info.minexp) - info.nmant
+        self._literals: dict[Fraction, str] = {}
 
     def nearest(self, value: Fraction) -> Fraction:
         """Round half to even at this type's precision, once, from the exact value."""
@@ -40,15 +47,19 @@ class Floating:
             return value
         magnitude = abs(value)
         exponent = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
-        while Fraction(2) ** exponent > magnitude:
+        if _power(exponent) > magnitude:  # the lengths tell it but for one
             exponent -= 1
-        while Fraction(2) ** (exponent + 1) <= magnitude:
-            exponent += 1
-        unit = Fraction(2) ** max(exponent - self._mantissa + 1, self._smallest)
+        unit = _power(max(exponent - self._mantissa + 1, self._smallest))
         rounded = round(magnitude / unit) * unit
         return rounded if value > 0 else -rounded
 
     def literal(self, value: Fraction) -> str:
+        text = self._literals.get(value)
+        if text is None:
+            text = self._literals[value] = self._literal(value)
+        return text
+
+    def _literal(self, value: Fraction) -> str:
         with np.errstate(over="ignore"):
             number = self.dtype(float(self.nearest(value)))
         if not np.isfinite(number):
@@ -73,25 +84,24 @@ class Floating:
             value = float(self.nearest(value))
         return self.dtype(value)
 
+    def quiet(self) -> AbstractContextManager[object]:
+        return np.errstate(all="ignore")
+
     def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
-        if op == "sum":
-            return self._sum(data, args)
-        with np.errstate(all="ignore"):
-            return _OPERATIONS[op](self, data, *args)
+        return self._sum(data, args) if op == "sum" else _OPERATIONS[op](self, data, *args)
 
     def _sum(self, pattern: tuple[tuple[int, int], ...], factors: list[Any]) -> Any:
         """Left to right, each product and each sum rounded, as C does without contraction."""
         total: Any = None
         position = 0
-        with np.errstate(all="ignore"):
-            for sign, count in pattern:
-                term = factors[position]
-                if total is None and sign < 0:
-                    term = -term
-                if count == 2:
-                    term = term * factors[position + 1]
-                position += count
-                total = term if total is None else total + term if sign > 0 else total - term
+        for sign, count in pattern:
+            term = factors[position]
+            if total is None and sign < 0:
+                term = -term
+            if count == 2:
+                term = term * factors[position + 1]
+            position += count
+            total = term if total is None else total + term if sign > 0 else total - term
         return total
 
 
@@ -115,7 +125,7 @@ def _wrap(s: Floating, period: Fraction, a: Any) -> Any:
 
 
 def _segment(s: Floating, table: Any, a: Any) -> int:
-    return sum(1 for v in table.x if s.convert(v) <= a)
+    return sum(1 for v in table.x[:-1] if s.convert(v) <= a) + int(s.convert(table.x[-1]) < a)
 
 
 def _table(s: Floating, table: Any, i: int, a: Any) -> Any:

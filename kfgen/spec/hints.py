@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfgen.spec.problems import did_you_mean, suggestion
+from kfgen.spec.problems import did_you_mean, short, suggestion
 from kfgen.spec.shapes import (
     Budget,
     Choice,
@@ -25,13 +25,27 @@ _SYNONYMS = {
     "model": "dynamics", "params": "parameters", "sensors": "measurements", "method": "integrator",
 }  # fmt: skip
 
+# what may be written for a kind: whole turns make no difference
+_WRAPPED = {"angle", "angular", "is_angle", "circular", "cyclic", "wrap", "wraps", "wrapped", "wrap_angle"}
+_PERIODIC = {"period", "periodic", "modulo", "modulus"}
+
 
 def meant_key(word: str, known: list[str]) -> str:
     """The key that an unknown one was probably meant for; empty without a guess."""
-    return _SYNONYMS.get(word) or suggestion(word, known) or ""
+    return "kind" if _is_kind(word, known) else _SYNONYMS.get(word) or suggestion(word, known) or ""
 
 
-def unknown_key_hint(word: str, known: list[str]) -> str:
+def _is_kind(word: str, known: list[str]) -> bool:
+    """Whether a key of a state or of a component says that it is an angle."""
+    return "kind" in known and ("init" in known or "h" in known) and word.lower() in _WRAPPED | _PERIODIC
+
+
+def unknown_key_hint(word: str, known: list[str], value: str = "") -> str:
+    """value: what is written for the key, where it is not a collection."""
+    if _is_kind(word, known):
+        told = value.lower() not in ("", "true", "yes", "on", "1", "angle", "false", "no", "off", "0")
+        angle = word.lower() in _WRAPPED and not told
+        return "write `kind: angle`" if angle else f"write `kind: {{periodic: {short(value)[1:-1] if told else 'P'}}}`"
     synonym = _SYNONYMS.get(word)
     return f"did you mean `{synonym}`?" if synonym in known else did_you_mean(word, known, "keys here")
 

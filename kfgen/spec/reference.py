@@ -67,8 +67,8 @@ _TITLES = {
 
 _FUNCTION_NOTES = {
     "where": "`where(condition, a, b)`: a where the condition holds, else b; only that one may fail",
-    "table": "`table(x, [x1, x2, ...], [y1, y2, ...])`: linear between the points, clamped at the ends; "
-    "the first list increases",
+    "table": "`table(x, [x1, x2, ...], [y1, y2, ...])`: linear between the points, clamped beyond the ends (there the "
+    "slope is that of the inside); the first list increases",
     "sign": "`sign(x)`: -1, 0 or 1",
     "atan2": "`atan2(y, x)`",
     "hypot": "`hypot(x, y)`",
@@ -100,7 +100,8 @@ DECISIONS = (
     "are not kept; a gate is allowed. It assumes that each prediction is followed by one update of each "
     "sensor, in order; get_covariance gives P after the last of them.",
     "adapt_R and adapt_Q lie strictly between 0 and 1; leave them out to switch them off. adapt_Q is "
-    "there for kf, ekf and ekf2.",
+    "there for kf, ekf and ekf2. With a run-time dt, Q may be a constant times dt: it is then kept, read "
+    "and learnt per second, each correction divided by the last step.",
     "Custom sigma points have one column per state, and so exclude `augment` with noises; wm sums to 1; "
     "`reject` needs a row of zeros among them.",
     "Covariances are checked where they are constant (P0 with parameters at their spec values): "

@@ -35,7 +35,7 @@ ADVICE = {
     "std_variance": "a `std` looks like a variance (`sigma**2`, `var_x`), or a `var` like a deviation",
     "precision": "P0 exceeds R by more than a float resolves, with `covariance: full`",
     "far_origin": "8 roundings of a float of a state's size exceed a tenth of its sigma, or take its motion",
-    "sigma_angle": "sigma points lie more than half a turn from the mean of an angle",
+    "sigma_angle": "sigma points lie more than half a turn from the mean of an angle that f or h bends",
     "alpha": "alpha makes weights that the scalar cannot carry",
     "ud_cost": "a prediction with `covariance: full` takes a third of the operations",
     "per_step": "a sensor's `rate` may bring more measurements in a step than `history` keeps of one",

@@ -193,7 +193,7 @@ FILTER = Record(
         Key(
             "adapt_Q",
             _CONSTANT,
-            "The same for the additive Q, which must be constant.",
+            "The same for the additive Q: constant, or a constant times a run-time dt (then learnt per second).",
             "off",
             only=_types(
                 "kf",

@@ -227,9 +227,9 @@ class Walker(Findings):
             inner = (*path, name.text)
             place = self.problems.at(name.line, name.column, path_text(inner))
             if key is None:
-                self.problems.add(place, f"unknown key {short(name.text)}", unknown_key_hint(name.text, known))
-                meant = meant_key(name.text, known)
-                self.meant.add(path_text((*path, meant)))
+                hint = unknown_key_hint(name.text, known, value.text if isinstance(value, Scalar) else "")
+                self.problems.add(place, f"unknown key {short(name.text)}", hint)
+                self.meant.add(path_text((*path, meant_key(name.text, known))))
                 if isinstance(value, Mapping):
                     self.doubtful.update(inner_key.text for inner_key, _ in value.items)
                 continue

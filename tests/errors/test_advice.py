@@ -43,6 +43,7 @@ ANGLE = BASE.replace("v: {init: 0, std: 1, unit: m/s}", "v: {init: 0, std: 1}\n 
 ANGLE = ANGLE.replace("v: 0.01}", "v: 0.01, a: 1e-4}")
 ANGLE = ANGLE.replace("std: 0.3}", "std: 0.3}, a: {h: a, std: 0.02, kind: angle}")
 UKF = ANGLE.replace("type: ekf", "type: ukf, sigma_points: {kind: merwe, alpha: 0.9}")
+BENT = ("0.98*v}", "0.98*v, a: a + 0.1*sin(a)}")
 INPUT = ("dynamics:", "inputs: {u: {unit: m/s^2}}\ndynamics:")
 BIAS = [("m/s}\n", "m/s}\n  b: {init: 0, std: 1}\n"), ("h: p,", "h: p + b,")]
 
@@ -107,7 +108,13 @@ def test_advice_that_is_due(pairs: list[tuple[str, str]], name: str, text: str) 
         (ANGLE, [("init: 0, std: 0.2", "init: 0, std: 15")], "degrees", "the standard deviation 15 rad"),
         (ANGLE, [("std: 0.02", "std: 5")], "degrees", "more than half a turn: degrees?"),
         (ANGLE, [("kind: angle}\n", "kind: angle, range: [-180, 180]}\n")], "degrees", "[-180, 180]"),
-        (UKF, [("init: 0, std: 0.2", "init: 0, std: 2.5")], "sigma_angle", "states.a.std: the sigma points of `a`"),
+        (UKF, [("init: 0, std: 0.2", "init: 0, std: 2.5"), BENT], "sigma_angle",
+         "states.a.std: the sigma points of `a` lie 4.1 from"),
+        (UKF, [("0.98*v}", "0.98*v, a: \"5*p + atan2(v, 3)\"}")], "sigma_angle", "dynamics.f.a: the sigma points"),
+        (UKF, [("{h: a,", "{h: a + 5*p + 0.1*sin(a),")], "sigma_angle",
+         "measurements.pos.z.a.h: the sigma points seen as `a` lie"),
+        (UKF.replace("kind: angle", "kind: {periodic: 1}"), [("init: 0, std: 0.2", "init: 0, std: 0.3"), BENT],
+         "sigma_angle", "more than half a turn (0.5)"),
         (UKF, [("alpha: 0.9", "alpha: 0.01")], "alpha", "filter.sigma_points.alpha: alpha below 0.05"),
     ],
 )
@@ -230,6 +237,14 @@ def test_loops_are_told_where_they_take_a_tenth() -> None:
     for code in ({"unroll": "full"}, {"unroll": "none"}, {"flash": 1 << 20}):
         decided = override(spec, code=code)
         assert [str(each) for each in advise(decided, build(decided)) if each.name == "loops"] == []
+
+
+def test_an_angle_that_is_passed_on_linearly_may_spread_beyond_a_turn() -> None:
+    wide = ("init: 0, std: 0.2", "init: 0, std: 2.5")
+    assert told(changed(wide, base=UKF)) == []
+    assert told(changed(wide, ("0.98*v}", "0.98*v + 0.1*sin(a), a: a + dt*v}"), base=UKF)) == []
+    assert told(changed(wide, BENT, base=UKF.replace("type: ukf", "type: ukf, covariance: sqrt"))) != []
+    assert told(changed(wide, BENT, base=ANGLE)) == []
 
 
 def test_every_name_is_one_of_the_languages() -> None:

@@ -77,10 +77,12 @@ def filters() -> dict[tuple[str, str], tuple[NativeFilter, NativeFilter]]:
              for kind, options in KINDS.items() for code in ("full", "none")}  # fmt: skip
     cases |= {(model, "full"): spec(model) for model in MODELS}
     cases["run-time", "full"] = spec(dt="{nominal: 0.01, min: 0.001, max: 0.1}")
-    made = [build(override(s, scalar, name=f"{scalar[0]}{k}")) for k, s in enumerate(cases.values())
-            for scalar in ("float", "double")]  # fmt: skip
-    loaded = load_filters(made, flags=["-O2"])
-    return dict(zip(cases, zip(loaded[::2], loaded[1::2], strict=True), strict=True))
+    single, double = (
+        load_filters([build(override(s, scalar, name=f"{scalar[0]}{k}")) for k, s in enumerate(cases.values())],
+                     flags=[level])
+        for scalar, level in (("float", "-O2"), ("double", "-O0"))
+    )  # fmt: skip
+    return dict(zip(cases, zip(single, double, strict=True), strict=True))
 
 
 def test_float_stays_beside_double(filters) -> None:

@@ -12,6 +12,8 @@ from scipy.optimize import least_squares
 from variants import FORMS, built, compiled, generated, spec_with
 
 from kfgen.generate import Generated
+from kfgen.reference import reference
+from kfgen.spec import loads
 from kfgen.status import Status
 
 BEACONS = np.array([[0.0, 0.0], [4.0, 0.0], [1.0, 5.0]])
@@ -212,3 +214,16 @@ def test_an_infinite_bend():
         assert (kf.predict() if what == "f" else kf.update("s", [1.0])) == Status.NOT_FINITE, form
         assert bytes(kf) == before
         assert (kf.update("s", [1.0]) if what == "f" else kf.predict()) == 0  # the other one does not care
+
+
+@pytest.mark.parametrize("scalar", ["double", "float", "q16.16"])
+@pytest.mark.parametrize("start", [-1, 0, 2])
+def test_a_table_has_the_inner_slope_at_its_ends(start, scalar):
+    """A filter that starts there is not deaf."""
+    text = problems.one_state("  form: discrete\n  f: {x: x}", z='{h: "table(x, [-1, 0, 2], [3, 1, 2])", var: 0.5}')
+    text = text.replace("init: 1", f"init: {start}")
+    slope, height = (-2.0, 3.0) if start < 0 else (0.5, 1.0 if start == 0 else 2.0)
+    gain = 0.5 * slope / (0.5 * slope**2 + 0.5)
+    for kf in (*built({0: spec_with(text, "type: ekf", "full-standard", scalar)}).values(), reference(loads(text))):
+        assert kf.update("s", [height + 0.6]) == 0
+        assert kf.x[0] == pytest.approx(start + 0.6 * gain, rel=1e-6, abs=3e-4 if scalar == "q16.16" else 0.0)

@@ -7,7 +7,9 @@ A failure here is the algorithm's: a guard is missing, or stands behind a store.
 from __future__ import annotations
 
 import itertools
+import json
 import math
+import re
 from collections.abc import Iterator
 from functools import cache
 
@@ -29,8 +31,10 @@ from sigma_cases import (
 )
 from variants import built
 
+from kfgen.errors import SpecError
 from kfgen.native import NativeFilter
 from kfgen.reference import reference
+from kfgen.spec import loads
 from kfgen.status import ERROR, Status, describe
 
 BAD = (math.nan, math.inf, -math.inf)
@@ -272,3 +276,24 @@ def test_a_million_steps():
         assert (result.var > 0).all(), key
         assert np.sqrt(np.mean((result.x[:, 0] - angle) ** 2)) < 0.2, key
         assert np.linalg.eigvalsh(kf.P)[0] > 0, key
+
+
+BEYOND = ("[[1, 2], [2, 1]]", "[[1, 1.01], [1.01, 1]]", "[[0, 0.1], [0.1, 1]]", "[[1, 0], [0, -0.001]]")
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_covariances_that_are_none(form):
+    """Given to a filter they leave it as it is; in a spec they are refused, with the pair that cannot be."""
+    kinds = ["", "{kind: cubature}"] + (["{redraw: false}"] if form == "full" else [])
+    cases = {(kind, how, scalar): unscented(CYCLE, form, f"sigma_points: {kind}" if kind else "", scalar,
+                                            f"code: {{unroll: {how}}}")
+             for kind in kinds for how in ("full", "none") for scalar in ("float", "double")}  # fmt: skip
+    for kf in built(cases).values():
+        calls = Calls(kf)
+        assert kf.predict() == 0
+        for P in BEYOND:
+            refused(calls, Status.NOT_POSITIVE, "set_covariance", P=np.array(json.loads(P), dtype=float).ravel())
+    plain = CYCLE.replace(", std: 0.3", "").replace(", std: 0.2}\ncov", "}\ncov")
+    for P in BEYOND[:3]:
+        with pytest.raises(SpecError, match="`x` and `y`"):
+            loads(re.sub("covariances: .*", f"P0: {P}", plain))

@@ -252,10 +252,10 @@ def test_wrap_stays_in_its_interval():
 def test_tables_are_clamped():
     table = Table((Fraction(-1), Fraction(0), Fraction(2)), (Fraction(3), Fraction(1), Fraction(2)))
     t = Trace()
-    for i in range(6):
+    for i in range(7):
         x = t.element("kf.x", i)
         t.store("kf.y", i, t.table(x, table))
         t.store("kf.s", i, t.table(x, table, slope=True))
-    _, memory, _ = executed(t, x=[-5, -1, -0.5, 0, 1, 9], y=[0] * 6, s=[0] * 6)
-    assert memory.arrays["kf.y"] == [3, 3, 2, 1, 1.5, 2]
-    assert [memory.arrays["kf.s"][i] for i in (0, 2, 4, 5)] == [0, -2, 0.5, 0]
+    _, memory, _ = executed(t, x=[-5, -1, -0.5, 0, 1, 2, 9], y=[0] * 7, s=[0] * 7)
+    assert memory.arrays["kf.y"] == [3, 3, 2, 1, 1.5, 2, 2]
+    assert memory.arrays["kf.s"] == [0, -2, -2, 0.5, 0.5, 0.5, 0]  # at the ends that of the inside

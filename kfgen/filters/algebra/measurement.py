@@ -23,12 +23,14 @@ from kfgen.filters.algebra.swept import remove
 class Measurement:
     """A scalar measurement: its row h (n,), its variance r, and its weight g, 1 but for robust updates.
 
-    An update with it makes s = r + g h P h^T, K = P h^T / s, P - g K s K^T.
+    An update with it makes s = r + g h P h^T, K = P h^T / s, P - g K s K^T. least: where r may be 0, what s has to be
+    above after some columns of U to be more than their round-off.
     """
 
     h: Vector
     r: Number
     g: Number = 1
+    least: Number = 0
 
 
 def bierman(U: Rows, D: Vector, measurements: list[Measurement]) -> tuple[Rows, Vector]:
@@ -58,7 +60,7 @@ def bierman(U: Rows, D: Vector, measurements: list[Measurement]) -> tuple[Rows, 
             if is_zero(f) or is_zero(D[j]):
                 continue
             weighted = times(measurement.g, f)
-            b, D[j], s[c] = _gain(D[j], f, weighted, s[c])
+            b, D[j], s[c] = _gain(D[j], f, weighted, s[c], measurement.least)
             steps.append((K[c], weighted, b))
         for i in reversed(range(j)):
             u = column[i]
@@ -87,13 +89,16 @@ def downdate(
     return ~(r >= -(s * tolerance)), r < 0
 
 
-def _gain(D: Number, f: Number, weighted: Number, before: Number) -> tuple[Number, Number, Number]:
-    """b, the new D and s of one column: s = before + g f^2 D, b = D f / s, D' = D before / s. weighted: g f."""
+def _gain(D: Number, f: Number, weighted: Number, before: Number, least: Number) -> tuple[Number, Number, Number]:
+    """b, the new D and s of one column: s = before + g f^2 D, b = D f / s, D' = D before / s. weighted: g f.
+
+    An s that is not above `least` is what rounding leaves of an f that is 0: 1 / f would drown all later columns.
+    """
     v = D if is_one(f) else D * f
     s = before + weighted * v
     if is_positive(before):
         assume_positive(s)
         inverse = 1 / s
         return v * inverse, assume_nonnegative(D * (before * inverse)), s
-    some, inverse = reciprocal(assume_nonnegative(s))
+    some, inverse = reciprocal(assume_nonnegative(s), least)
     return v * inverse, assume_nonnegative(D * select(some, before * inverse, 1)), s

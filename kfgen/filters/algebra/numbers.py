@@ -20,7 +20,9 @@ Number = Any  # a Value, or a Python or numpy number
 
 def is_zero(a: Number) -> bool:
     """Structurally zero."""
-    return bool(a.constant == 0) if isinstance(a, Value) else bool(a == 0)
+    if isinstance(a, Value):
+        return a.node.op == "const" and not a.node.data
+    return bool(a == 0)
 
 
 def is_constant(a: Number) -> bool:
@@ -39,13 +41,13 @@ def select(condition: Any, a: Number, b: Number) -> Number:
     return a if condition else b
 
 
-def reciprocal(a: Number) -> tuple[Any, Number]:
-    """Whether a, which is not negative, is above zero, and 1/a or 0.
+def reciprocal(a: Number, least: Number = 0) -> tuple[Any, Number]:
+    """Whether a, which is not negative, is above zero, or `least`, and 1/a or 0.
 
     Above zero is above the smallest number that has a reciprocal: 1/a is then finite, and so is the quotient of
-    anything that a contains.
+    anything that a contains. least is not below it.
     """
-    some = a > (a.trace.smallest if isinstance(a, Value) else 0)
+    some = a > (least if not is_zero(least) else a.trace.smallest if isinstance(a, Value) else 0)
     if isinstance(a, Value):
         return some, select(some, 1 / a, 0)
     return some, 1 / a if some else 0

@@ -42,8 +42,10 @@ class Moved:
             out[i] = t.name(t.value(plus(x[i], m)), f"{names[i]}_next")
         return out
 
-    def learnt(self, kept: Kept, rate: Fraction) -> Learnt:
-        entries, factors = kept.learnt(self.t, list(self.steps), rate)
+    def learnt(self, kept: Kept, rate: Fraction, scale: Value | None) -> Learnt:
+        factor = 1 if scale is None else scale
+        steps = [[times(dx, factor) for dx in step] for step in self.steps]
+        entries, factors = kept.learnt(self.t, steps, rate)
         guards.finite(self.t, [self.t.value(entries[i, i]) for i in range(kept.k)])
         return Learnt(self.t, kept, entries, factors)
 

@@ -8,7 +8,7 @@ from typing import Protocol
 from kfgen.filters.algebra import linalg
 from kfgen.filters.algebra.factors import udu, udu_computed
 from kfgen.filters.algebra.linalg import Rows, Vector
-from kfgen.filters.algebra.numbers import is_zero, require_nonnegative
+from kfgen.filters.algebra.numbers import Number, is_zero, require_nonnegative
 from kfgen.filters.algebra.symmetric import assembled
 
 NEGATIVE = "a noise variance is negative"
@@ -61,10 +61,11 @@ class Computed:
 
 
 class Factored:
-    """A Q that is kept as its factors. field: where, U above D, upper triangle by columns."""
+    """A Q that is kept as its factors. field: where, U above D, upper triangle by columns; times: by what D is more."""
 
-    def __init__(self, U: Rows, D: Vector, field: str = "") -> None:
+    def __init__(self, U: Rows, D: Vector, field: str = "", times: Number = 1) -> None:
         self.field = field
+        self.times = times
         self.U = U
         self.D = D
 

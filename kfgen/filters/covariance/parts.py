@@ -66,8 +66,9 @@ class Motion(Protocol):
         """x + dx, not yet in its chart. x (n,) and names in the spec's order, as is what is returned."""
         ...
 
-    def learnt(self, kept: Kept, rate: Fraction) -> Learning:
-        """Q <- (1 - rate) Q + rate times the sum of dx_i dx_i^T over the measurements, Q as it is kept."""
+    def learnt(self, kept: Kept, rate: Fraction, scale: Value | None) -> Learning:
+        """Q <- (1 - rate) Q + rate times the sum of dx_i dx_i^T over the measurements, Q as it is kept. scale: a factor
+        of each dx_i."""
         ...
 
 

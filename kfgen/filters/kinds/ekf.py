@@ -57,7 +57,7 @@ class Ekf(SingleFilter):
              for i, (value, name) in enumerate(zip(result.x, model.states, strict=True))]  # fmt: skip
         P0 = self.form.load(t)
         x = self.form.kept(t, x, prior.x)
-        P = self.form.predict(t, P0, F, self.additive(t, result), noise)
+        P = self.form.predict(t, P0, F, self.additive(t, result, step), noise)
         evidence = self.unconfined(x) + self.form.evidence(P, after_predict=True)
         P = self.limited(t, P)
         free, x = x, self.state.confined(t, x)
@@ -71,6 +71,8 @@ class Ekf(SingleFilter):
         yield Made(x, P)
         self.store(t, x, moved if t.in_place else set(range(len(x))), P, after_predict=True)
         self.compensation.store(t, rests, free, x)
+        if self.Q is not None:
+            self.Q.store_step(t, step.dt)
 
     def advance(self, t: Trace, prior: Prior, step: Step) -> Advance:
         """The model's step from the prior, in the spec's order."""
@@ -78,10 +80,10 @@ class Ekf(SingleFilter):
         nothing = None if self.Q is None else [[t.zero] * n for _ in range(n)]
         return process.advance(t, self.model, prior, step, nothing, self.derivatives)
 
-    def additive(self, t: Trace, result: Advance) -> Additive:
+    def additive(self, t: Trace, result: Advance, step: Step) -> Additive:
         """Q in the inner order."""
         Q = [[result.Q[i][j] for j in self.order] for i in self.order]
-        return Given(Q) if self.Q is None else self.Q.additive(t, Q)
+        return Given(Q) if self.Q is None else self.Q.additive(t, Q, step.dt)
 
     # update ------------------------------------------------------------------------------------------
 
@@ -196,7 +198,7 @@ class Ekf(SingleFilter):
             guards.finite(t, learnt.residual)
         if self.Q is not None:
             t.section("Q: what the state has moved")
-            learnt.Q = motion.learnt(self.Q.kept, self.Q.rate)
+            learnt.Q = motion.learnt(self.Q.kept, self.Q.rate, self.Q.scale(t))
         return learnt
 
     def store_update(self, u: Update, x: list[Value], P: Any, learnt: Learnt) -> None:

@@ -46,9 +46,9 @@ class Ekf2(Ekf):
         x = [a + m for a, m in zip(result.x, terms.mean, strict=True)]
         return replace(result, x=x, Q=Q, steps=with_means(result.steps, terms.mean))
 
-    def additive(self, t: Trace, result: Advance) -> Additive:
+    def additive(self, t: Trace, result: Advance, step: Step) -> Additive:
         if self.Q is not None or not any(d.hessian for d in result.after):
-            return super().additive(t, result)
+            return super().additive(t, result, step)
         Q = [[result.Q[i][j] for j in self.order] for i in self.order]
         return Computed(Q, len(Q) * self.scalar.epsilon)
 

@@ -52,7 +52,7 @@ class SingleFilter(ABC):
         self.names = [model.errors[i] for i in order]
         options = model.options
         self.Q = None if options.adapt_Q is None else AdaptedQ(model, order, form.factored, scalar.epsilon)
-        extra = [] if self.Q is None else [self.Q.kept.block()]
+        extra = [] if self.Q is None else self.Q.blocks()
         for sensor in model.sensors:
             adapted = self.adapted_R(sensor)
             extra += [] if adapted is None else adapted.blocks()

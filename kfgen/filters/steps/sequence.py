@@ -7,7 +7,7 @@ whole vector. Robust and adaptive updates, floors of the innovation variance and
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Generic
 
@@ -133,7 +133,7 @@ class Sequence(Generic[P]):
         nu = self._innovation(innovation, c)(motion)
         measurement = Measurement(innovation.rows[c], innovation.variances[c])
         if exact:
-            measurement = self._unless_known(P, prior, measurement)
+            measurement = self._unless_known(P, prior, measurement, c)
         used = None if innovation.used is None else innovation.used[c]
         P, nu, measurement, failed = self._prepared(P, c, nu, measurement, used, below)
         return P, Scalar(measurement, lambda _: nu), failed
@@ -148,7 +148,7 @@ class Sequence(Generic[P]):
         if self.influence is not None:
             nu, g = weigh(t, self.model, self.influence, name, nu, r, used)
         if self.threshold is None and floor is None:
-            return P, nu, Measurement(h, r, g), []
+            return P, nu, replace(measurement, g=g), []
         spread = t.value(times(g, self.form.variance(P, h)))
         failed: list[Value] = []
         if self.threshold is not None:
@@ -169,24 +169,37 @@ class Sequence(Generic[P]):
             if not (self.plain and departs(self.model)):  # that one is judged, not made
                 t.flag(low, "REGULARIZED")
             r = assume_positive(select(low, floor - spread, r))
-        return P, nu, Measurement(h, r, g), failed
+        return P, nu, replace(measurement, r=r, g=g), failed
 
     def _uncertain(self, P: P, h: Vector, spread: Value) -> Value:
         """Whether h P h^T is more than what rounding leaves of a direction that is known exactly."""
         if not _several(h):
             return self.t.wrapped(self.t.pool.boolean(True))
-        dense = self.form.entries(P)
-        terms = [x * x * dense[i, i] for i, x in enumerate(h) if not is_zero(x)]
-        uncertain: Value = spread > sum(terms[1:], terms[0]) * (8 * self.form.n * self.epsilon)
+        uncertain: Value = spread > self._size(P, h) * self._share
         return uncertain
 
-    def _unless_known(self, P: P, prior: P, measurement: Measurement) -> Measurement:
+    @property
+    def _share(self) -> Fraction:
+        """Of a sum of variances: what rounding may leave of it."""
+        return 8 * self.form.n * self.epsilon
+
+    def _size(self, P: P, h: Vector) -> Value:
+        """What h P h^T would be without correlations."""
+        dense = self.form.entries(P)
+        terms = [x * x * dense[i, i] for i, x in enumerate(h) if not is_zero(x)]
+        total: Value = sum(terms[1:], terms[0])
+        return total
+
+    def _unless_known(self, P: P, prior: P, measurement: Measurement, c: int) -> Measurement:
         """The measurement, with h = 0 where it says exactly what is known exactly already: it is then skipped."""
         h, t = measurement.h, self.t
         spread = t.value(self.form.variance(P, h))
         lowest = -t.value(self.form.tolerance(prior, h))
         known = ~self._uncertain(prior, h, spread) & (t.value(measurement.r) <= 0) & ~(spread < lowest)
-        return Measurement([x if is_zero(x) else select(known, 0, x) for x in h], measurement.r)
+        least: Any = 0  # integers have no round-off that small
+        if t.smallest:
+            least = t.name(self._size(prior, h) * self._share**2 + t.smallest, f"least_{self.names[c]}")
+        return Measurement([x if is_zero(x) else select(known, 0, x) for x in h], measurement.r, least=least)
 
 
 def _several(h: Vector) -> bool:

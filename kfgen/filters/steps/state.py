@@ -92,7 +92,7 @@ class StateCode:
         for block in self.blocks():
             if block.size is None:
                 zero = {
-                    "real": t.zero,
+                    "real": t.value(block.initial[0]) if block.initial else t.zero,
                     "uint32": t.wrapped(t.pool.integer(0)),
                     "bool": t.wrapped(t.pool.boolean(False)),
                 }

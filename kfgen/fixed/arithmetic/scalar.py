@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from fractions import Fraction
 from typing import Any
 
@@ -47,21 +48,23 @@ class Fixed:
     def convert(self, value: Any) -> Any:
         return int(value)
 
+    def quiet(self) -> AbstractContextManager[object]:
+        return nullcontext()
+
     def evaluate(self, op: str, data: Any, args: list[Any]) -> Any:
+        if op == "q_mac":
+            return self._mac(args, data[0])
+        if op == "q_fma":
+            c, a, b = args
+            assert -INSIDE <= a <= INSIDE, "factors that were proved to be small are not"
+            assert -INSIDE <= b <= INSIDE, "factors that were proved to be small are not"
+            return self._proved(c + scale(a * b, data[0], self.rounding))
         if op.startswith(PREFIX):
-            name = op.removeprefix(PREFIX)
-            if op == "q_fma":
-                c, a, b = args
-                assert max(abs(a), abs(b)) <= INSIDE, "factors that were proved to be small are not"
-                return self._proved(c + scale(a * b, data[0], self.rounding))
-            if op == "q_mac":
-                return self._mac(args, data[0])
             if op == "q_fit":
-                if abs(args[0]) > INSIDE:
-                    self.status.saturate()
-                return max(-INSIDE, min(INSIDE, args[0]))
+                return self._inside(args[0])
             if op in _OPERATIONS:
                 return _OPERATIONS[op](data, *args)
+            name = op.removeprefix(PREFIX)
             given = [*args, *(data or ())]
             if name in _ROUNDED:
                 return TWINS[name](*given, self.status, self.rounding)
@@ -73,12 +76,17 @@ class Fixed:
 
     def _mac(self, args: list[int], s: int) -> int:
         """c + a b / 2^s, clipped."""
-        assert max(map(abs, args)) <= INSIDE
         c, a, b = args
-        total = c + scale(a * b, s, self.rounding)
-        if abs(total) > INSIDE:
-            self.status.saturate()
-        return max(-INSIDE, min(INSIDE, total))
+        assert -INSIDE <= c <= INSIDE
+        assert -INSIDE <= a <= INSIDE
+        assert -INSIDE <= b <= INSIDE
+        return self._inside(c + scale(a * b, s, self.rounding))
+
+    def _inside(self, value: int) -> int:
+        if -INSIDE <= value <= INSIDE:
+            return value
+        self.status.saturate()
+        return -INSIDE if value < 0 else INSIDE
 
     def _proved(self, value: int) -> int:
         if not LEAST <= value <= LIMIT:
@@ -95,7 +103,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "lt": lambda d, a, b: a < b,
     "le": lambda d, a, b: a <= b,
     "not": lambda d, a: not a,
-    "segment": lambda d, a: sum(1 for v in d.x if v <= a),
+    "segment": lambda d, a: sum(1 for v in d.x[:-1] if v <= a) + (d.x[-1] < a),
     "table_x": lambda d, i: int(d.starts()[i]),
     "table_y": lambda d, i: int(d.values()[i]),
     "table_slope": lambda d, i: int(d.slopes()[i]),

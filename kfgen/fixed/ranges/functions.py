@@ -31,7 +31,7 @@ def _wrap(a: float, period: float) -> float:
 
 
 def _segment(a: float, points: list[float]) -> int:
-    return sum(1 for p in points if p <= a)
+    return sum(1 for p in points[:-1] if p <= a) + (points[-1] < a)
 
 
 FUNCTIONS: dict[str, Any] = {

@@ -32,10 +32,15 @@ class Ranges:
         return found
 
     def see(self, key: Any, value: float) -> None:
-        i = self.slot(key)
-        if math.isfinite(value):
-            self.high[i] = max(self.high[i], value)
-            self.low[i] = min(self.low[i], value)
+        self.meet(self.slot(key), value)
+
+    def meet(self, slot: int, value: float) -> None:
+        """The same by its place."""
+        if value > self.high[slot]:
+            if value < math.inf:
+                self.high[slot] = value
+        elif -math.inf < value < self.low[slot]:
+            self.low[slot] = value
 
     def copy(self) -> Met:
         """What has been met so far; for `restore`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 
 from kfgen.filters.base import FilterCode
 from kfgen.filters.steps.outputs import FUNCTION
@@ -187,15 +188,24 @@ class Runner:
 
     def _look(self, memory: Memory) -> None:
         """What the fields hold, whoever has stored it."""
+        meet = self.ranges.meet
+        for name, slots in self.slots:
+            if isinstance(slots, int):
+                meet(slots, memory.numbers[name])
+            else:
+                for slot, value in zip(slots, memory.arrays[name], strict=True):
+                    meet(slot, value)
+
+    @cached_property
+    def slots(self) -> list[tuple[str, int | list[int]]]:
+        """The fields that hold numbers, and the places of these among the ranges."""
+        slot, found = self.ranges.slot, list[tuple[str, int | list[int]]]()
         for block in self.code.blocks:
-            if block.kind != "real":
-                continue
-            key = ("array", f"kf.{block.name}")
-            if block.size is None:
-                self.ranges.see(("number", f"kf.{block.name}"), memory.numbers[f"kf.{block.name}"])
-                continue
-            for i, value in enumerate(memory.arrays[f"kf.{block.name}"]):
-                self.ranges.see(self.program.arrays.element(key, i), value)
+            if block.kind == "real":
+                name = f"kf.{block.name}"
+                elements = [self.program.arrays.element(("array", name), i) for i in range(block.size or 0)]
+                found.append((name, slot(("number", name)) if block.size is None else [slot(e) for e in elements]))
+        return found
 
     def _tell(self, memory: Memory) -> None:
         """The outputs, where there are some."""

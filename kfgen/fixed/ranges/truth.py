@@ -137,6 +137,9 @@ class Truth:
 def draw(P: list[list[float]], random: Random) -> list[float]:
     """A draw from N(0, P), by its lower root; what is not positive has no spread."""
     n = len(P)
+    if not any(P[i][j] for i in range(n) for j in range(i)):  # for the speed
+        pairs = zip(random.standard_normal(n), (P[i][i] for i in range(n)), strict=True)
+        return [math.sqrt(variance) * number if variance > 0 else 0.0 for number, variance in pairs]
     S = [[0.0] * n for _ in range(n)]
     for j in range(n):
         pivot = P[j][j] - sum(S[j][k] ** 2 for k in range(j))

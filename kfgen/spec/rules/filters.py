@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from typing import Any
+
 from kfgen.errors import Place
 from kfgen.spec.affine import Affine
+from kfgen.spec.constants import keep
 from kfgen.spec.operations import Value
 from kfgen.spec.problems import short
 from kfgen.spec.raw import BAD
@@ -30,7 +34,7 @@ def check(facts: Facts) -> None:
             if filter_of(chosen, sensor).adapt_R is not None:
                 _constant_R(facts, model, sensor)
         if chosen.adapt_Q is not None:
-            _constant(facts, model, _entries(model.dynamics.Q), "adapt_Q", "Q")
+            _adapted_Q(facts, model)
         if chosen.sigma_points is not None:
             check_points(facts, model, chosen.sigma_points)
 
@@ -203,11 +207,42 @@ def _constant(
 ) -> None:
     """One mistake per matrix, at the first entry that varies. allowed: a kind of name that may."""
     for entry in entries:
-        uses = frozenset(name for name in model.context.uses(entry) if model.context.kinds.get(name) != allowed)
+        uses = frozenset(name for name in model.context.uses(entry) if model.context.kinds.get(name, name) != allowed)
         varying = _varying(model, uses)
         if varying:
             facts.add(entry.place, f"{what} varies with {varying}, but `{key}` wants it constant", "use constants")
             return
+
+
+def _adapted_Q(facts: Facts, model: Model) -> None:
+    """Constant, or a constant times a run-time dt."""
+    entries = _entries(model.dynamics.Q)
+    dt = model.context.spec.dt
+    if dt is None or not dt.run_time or not any("dt" in model.context.uses(entry) for entry in entries):
+        _constant(facts, model, entries, "adapt_Q", "Q")
+        return
+    _constant(facts, model, entries, "adapt_Q", "Q", "dt")
+    form = Affine(model.context, frozenset({"dt"}))
+    for entry in entries:
+        if entry.tree == BAD or not model.context.uses(entry) <= {"dt", *facts.known(model.context), *_lets(model)}:
+            continue
+        at = [_at(facts, model, entry, step) for step in (1, 2)]
+        if None in at or not form.form(entry.tree).affine or at[1] != 2 * at[0]:
+            text = f"{short(entry.text)} is no constant times dt, but `adapt_Q` learns variances per second"
+            facts.add(entry.place, text, "write each entry of Q as a constant times dt, or all as constants")
+            return
+
+
+def _lets(model: Model) -> list[str]:
+    return [definition.name for definition in model.context.let]
+
+
+def _at(facts: Facts, model: Model, entry: Expression, step: int) -> Any:
+    """The value of an entry at a step."""
+    known = {**facts.constant, "dt": Fraction(step)}
+    for definition in model.context.let:
+        keep(known, definition.name, definition.value.tree)
+    return facts.tree(entry.tree, known)
 
 
 def _constant_R(facts: Facts, model: Model, sensor: Sensor) -> None:

@@ -127,7 +127,7 @@ def bierman(kernels: Kernels, n: int, single: bool, sure: bool, weighted: bool, 
                 inverse = t.name(1 / after, "inverse")
                 D[j] = d * (before * inverse)
             else:
-                some = t.name(after > t.smallest, "some")
+                some = t.name(after > (t.smallest if single else t.field("least")), "some")
                 inverse = t.name(select(some, 1 / after, 0), "inverse")
                 D[j] = d * select(some, before * inverse, 1)
             if moves:
@@ -154,6 +154,7 @@ def bierman(kernels: Kernels, n: int, single: bool, sure: bool, weighted: bool, 
         arguments += [counter_argument("state"), number_argument("h")]
     else:
         arguments += [array_argument("h", n, constant=True), counter_argument("first"), counter_argument("last")]
+        arguments += [number_argument("least")] * (not sure)
     arguments += [number_argument("r")] + [number_argument("weight")] * weighted
     arguments += [number_argument("nu"), array_argument("moved", n)] if moves else [array_argument("gain", n)]
     arguments.append(array_argument("s", 2))

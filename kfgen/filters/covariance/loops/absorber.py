@@ -176,7 +176,7 @@ class Absorber:
             with t.loop("j", 0, n) as at:
                 with t.loop("i", 0, at) as above:
                     U[strict_start(at) + above] = t.element(Q.field, upper_start(at) + above)
-                D[at] = t.element(Q.field, upper_start(at) + at)
+                D[at] = t.value(linalg.times(t.element(Q.field, upper_start(at) + at), Q.times))
         else:
             flat = {strict(row, col): t.value(UQ[row][col]) for col in range(n) for row in range(col)}
             if any(is_zero(u) for u in flat.values()):

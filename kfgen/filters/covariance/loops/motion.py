@@ -70,9 +70,12 @@ class Displacement:
             out[k] = t.element("kf.x", k) + self.at(i)
         return [out[i] for i in range(self.n)]
 
-    def learnt(self, kept: Kept, rate: Fraction) -> Learnt:
+    def learnt(self, kept: Kept, rate: Fraction, scale: Value | None) -> Learnt:
         """Tests that the next Q is finite."""
         t, field = self.t, f"kf.{kept.field}"
+        if scale is not None:
+            scaled = tuple((gain, t.name(step * scale, "scaled")) for gain, step in self.terms)
+            return self.with_terms(self.array, scaled).learnt(kept, rate, None)
         total = t.variable(t.unique("trace"), 0)
         with t.loop("i", 0, self.n) as i:
             value = t.element(field, upper_start(i) + i)

@@ -110,7 +110,8 @@ class LoopedUD(ByFactors, UDStore):
             if len(seen) == 1:
                 return [integer(t, seen[0]), t.value(measurement.h[seen[0]])]
             first, last = space.row(measurement.h)
-            return [("h", 0), integer(t, first), integer(t, last)]
+            least = [] if is_positive(measurement.r) else [t.value(measurement.least)]
+            return [("h", 0), integer(t, first), integer(t, last), *least]
 
         gain = self.measured(space, scalar, motion, moves, function, row)
         if self.change is not None:
