@@ -17,6 +17,7 @@ from kfgen.fixed.formats.report import periods, table, units
 from kfgen.fixed.linear import linear
 from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
+from kfgen.fixed.program.inline import inlined
 from kfgen.fixed.program.unroll import unrolled
 from kfgen.fixed.ranges.box import Box
 from kfgen.fixed.ranges.drive import Drive, Seen
@@ -96,7 +97,7 @@ class _Builder:
 
     def __init__(self, code: FilterCode, scalar: Fixed, logs: Sequence[Log]) -> None:
         self.scalar = scalar
-        self.real = replace(code, functions=tuple(unrolled(f, code.constants) for f in code.functions))
+        self.real = replace(code, functions=tuple(unrolled(f, code.constants) for f in inlined(code.functions)))
         self.functions = list(self.real.functions)
         self.arrays, self.ranges = find_arrays(self.functions), Ranges()
         self.program = RealProgram(self.functions, self.arrays, self.ranges)

@@ -25,6 +25,8 @@ class Products(Quotients):
 
     def product(self, node: Node, e: int | None) -> Raw:
         a, b = self.constant_first(node.args)
+        if a.constant == 0:
+            return self.literal(Fraction(0), e)
         if a.constant is not None and not self._inverse_of(b):
             exact = self.literal(a.constant, None)
             if abs(int(exact.node.constant or 0)) == 1:

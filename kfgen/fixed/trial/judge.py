@@ -34,7 +34,7 @@ def judge(program: RealProgram, real: FilterCode, integers: IntegerProgram, inte
     state = real.model.spec.states[found.state]
     what, bits = _carrying(formats, found.state, real, scalar), _missing(found.sigmas)
     raise SpecError.at(
-        state.place, f"{what}; {bits} bit{'s' * (bits > 1)} are missing",
+        state.place, f"{what}; {bits} {'bits are' if bits > 1 else 'bit is'} missing",
         _cure(real, found.state, bits),
     )  # fmt: skip
 
