@@ -213,7 +213,7 @@ class Carry:
 
     def _gathered(self, total: Node, a: Raw, b: Raw, e: int) -> Node:
         s = e - a.e - b.e
-        if -CARRIED <= s < 0 and a.size << -s > LIMIT and a.node.constant is None and b.node.constant is None:
+        if s < 0 and a.size << min(-s, BITS) > LIMIT and a.node.constant is None and b.node.constant is None:
             # in the cell's own format it fits where the cell does; shifted by so much, a factor may not
             a = self.x.scaled_product(a, b, e + CARRIED)
             b = Raw(constant(ONE), -CARRIED, ONE, ONE)

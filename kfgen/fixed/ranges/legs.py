@@ -9,10 +9,10 @@ from kfgen.fixed.ranges.box import Box, Span
 from kfgen.fixed.ranges.generator import Random
 from kfgen.model import Model
 
-LEGS = 16
+LEGS = 24
 CORNER = 1 / 2  # the share of legs that begin and drive at the ends of everything
 NEAR = 1e-6  # of a range: how near to its end a corner is
-VANISHING = 1 / 32  # the same where the lower end of a parameter is 0: what a noise of nothing leaves has no size
+VANISHING = 1 / 32  # the same where the lower end of a parameter is 0, in every other leg
 
 
 @dataclass
@@ -20,7 +20,8 @@ class Leg:
     """Where one begins, what it is given: parameters by name, and what a row draws inputs and dt from.
 
     places: of each quantity in [0, 1], where it is kept around; 0 and 1 are the ends. fresh: with the covariance of the
-    first estimate, and not with what the leg before has left.
+    first estimate, and not with what the leg before has left. vanishing: a parameter may be 0, and what a noise of
+    nothing leaves has no size.
     """
 
     corner: bool
@@ -29,6 +30,7 @@ class Leg:
     x: list[float]
     parameters: dict[str, float]
     places: dict[str, float] = field(default_factory=dict)
+    vanishing: bool = False
 
 
 def legs(model: Model, box: Box, random: Random, count: int = LEGS) -> Iterator[Leg]:
@@ -50,9 +52,13 @@ def legs(model: Model, box: Box, random: Random, count: int = LEGS) -> Iterator[
             span = box.states[i]
             x.append(float(start) if span is None else at(span, places[f"x.{state}"]))
         parameters = {name: float(value) for name, value in model.parameters}
+        vanishing = k % 5 == 1 and any(span[0] == 0 for span in box.parameters.values())
         for name, span in box.parameters.items():
-            parameters[name] = at(span, places[f"p.{name}"], VANISHING if span[0] == 0 else NEAR)
-        yield Leg(corner, k % 4 < 2, k % 3 == 2, x, parameters, places)
+            place = places[f"p.{name}"]
+            if span[0] == 0:
+                place = max(place, 0.0 if vanishing else VANISHING)
+            parameters[name] = span[0] if place == 0 == span[0] else at(span, place)
+        yield Leg(corner, k % 4 < 2, k % 3 == 2, x, parameters, places, vanishing)
 
 
 def _shuffled(count: int, random: Random) -> list[int]:
@@ -63,8 +69,8 @@ def _shuffled(count: int, random: Random) -> list[int]:
     return order
 
 
-def at(span: Span, place: float, near: float = NEAR) -> float:
-    """The point of a span at a place in [0, 1], a little inside. near: how far from its lower end."""
+def at(span: Span, place: float) -> float:
+    """The point of a span at a place in [0, 1], a little inside."""
     low, high = span
-    place = min(max(place, near), 1.0 - NEAR)
+    place = min(max(place, NEAR), 1.0 - NEAR)
     return low + (high - low) * place
