@@ -39,9 +39,15 @@ def simulate(spec: Path, out: Path, steps: int, seed: int, every: dict[str, int]
 
     The first state is drawn from N(x0, P0), and so are all noises. Inputs are slow sines within a quarter of
     their range (of amplitude 1 where they have none). A run-time dt is the nominal one with 10 % of jitter.
+    Where the truth leaves a declared range, a warning says so.
     """
     from kfgen import simulate as simulation
+    from kfgen.excursions import excursions
     from kfgen.logs import write
 
     keep_apart({"the spec": spec}, {"-o": out})
-    write(out, simulation.simulate(load_spec(spec), steps, seed, every).columns)
+    loaded = load_spec(spec)
+    columns = simulation.simulate(loaded, steps, seed, every).columns
+    write(out, columns)
+    for warning in excursions(loaded, columns):
+        click.echo(warning, err=True)

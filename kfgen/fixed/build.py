@@ -38,8 +38,9 @@ from kfgen.logs import Log
 WIDER = 2.0**6  # times what runs have met: an interval that is wider than that has overrated its value
 DRIVEN, TRIED = 21, 31  # seeds of the runs over the box, of the first trial
 TRIALS = 4  # each with runs of its own, until nothing saturates
-LEGS, ROWS = 10, 50  # of a trial
-OUTAGES = (24, 16, 8)  # rows without readings; the last is told of
+INNER, ROWS = 8, 40  # of a trial
+OUTAGES = (24, 12, 4, 0)  # rows without readings
+SHORT = 12  # what is less than that is told of
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,8 @@ class Part:
 def _less(part: Part, whole: Box, reason: SpecError) -> tuple[str, ...]:
     """What is said of a filter that holds in a part of its box only."""
     where = []
-    if part.outage == OUTAGES[-1]:
-        where.append(f"for at most {part.outage} steps without readings")
+    if part.outage < SHORT:
+        where.append(f"for at most {part.outage} steps without readings" if part.outage else "without outages")
     if part.box != whole:
         where.append("for states near where the model itself leads")
     mistake = reason.mistakes[0]
@@ -134,12 +135,12 @@ class _Builder:
 
     def _parts(self) -> list[Part]:
         """From all that is wanted to the least that is of use."""
-        box, (long, short, least) = self.box, OUTAGES
+        box, longest = self.box, OUTAGES[0]
         if not box.wide:
-            return [Part(box, short), Part(box, least)]
+            return [Part(box, outage) for outage in OUTAGES]
         known = unknown(box, [float(row[i]) for i, row in enumerate(self.real.model.P0)])
-        return [Part(box, long, known, spare=1), Part(box, long, known), Part(box, short, known),
-                Part(box, least, known), Part(box.without_states(), least, known)]  # fmt: skip
+        return [Part(box, longest, known, spare=1), *(Part(box, outage, known) for outage in OUTAGES),
+                Part(box.without_states(), 0, known)]  # fmt: skip
 
     def _see(self, drive: Drive, part: Part) -> None:
         """Runs over a part of the box, and what intervals say of it."""
@@ -155,12 +156,12 @@ class _Builder:
             found = self._lowered(part.spare)
             told = self._judged(found)
             tour = Tour(self.program, found.program, self.real, found.formats, found.code, self.box, part.limits)
-            drive.run(tour, TRIED + trial, LEGS, ROWS)
+            drive.run(tour, TRIED + trial, INNER, ROWS)
             if not tour.found.saturated:
                 break
         if not tour.found.carried:
             shaken = ShakenTour(self.program, self.real, found.formats, self.box, part.limits)
-            drive.run(shaken, TRIED + trial, LEGS, ROWS)
+            drive.run(shaken, TRIED + trial, INNER, ROWS)
             refuse(tour.found, shaken.found, self.real, found.formats, self.scalar)
         return replace(self._filter(found), widest=dict(drive.seen) if self.box.wide else {}, told=told)
 

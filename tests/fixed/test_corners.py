@@ -9,6 +9,7 @@ from test_filters import ATT
 
 import kfgen
 from kfgen.check import check
+from kfgen.commands.check import report
 from kfgen.errors import SpecError
 from kfgen.generate import build
 from kfgen.override import override
@@ -80,6 +81,14 @@ imm:
     wild: {dynamics: {f: {p: p + dt*v}, Q: {v: 1}}, filter: {type: ekf}}
   transition: [[0.95, 0.05], [0.05, 0.95]]
 """
+WANDER = HEAD + """
+name: wander
+dt: 0.1
+states: {p: {init: 0, std: 5, range: [-20, 20]}, v: {init: 0, std: 2}}
+dynamics: {f: {p: p + dt*v}, Q: {v: 0.5}}
+measurements: {m: {z: {p: {h: p, std: 0.5}}}}
+filter: {type: kf}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +158,7 @@ def test_a_bound_of_a_correlation_keeps_small_variances_apart():
 
 
 def test_a_product_with_nothing_ends():
-    with pytest.raises(SpecError, match="cannot carry `k`.*1 bit is missing"):
+    with pytest.raises(SpecError, match=r"cannot carry `k`.*1 bit is missing"):
         build(loads(SILENT))
 
 
@@ -158,3 +167,12 @@ def test_what_a_check_may_find_wrong_is_said():
     assert "carries `p` within" in told
     assert "bits missing; start with a smaller std" in told
     assert build(loads(BANK.replace("std: 100}", "std: 5}"))).fixed.told == ()
+
+
+def test_a_check_tells_a_track_that_leaves_its_range_from_a_wrong_filter():
+    outcome = check(loads(WANDER))
+    assert outcome.passed
+    assert 0 < outcome.outside < outcome.steps
+    assert any(isinstance(part, str) and "steps not compared: there the model's own track" in part
+               for part in report(outcome))  # fmt: skip
+    assert check(override(loads(WANDER), "double")).outside == 0

@@ -30,6 +30,7 @@ ALLOWED = {
     # the spec, and what reads only it
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
+    "excursions": {"errors", "spec"},
     "logs": SPEC | {"files"},
     "reference": {"errors", "spec"},
     # from a spec to C
@@ -49,14 +50,16 @@ ALLOWED = {
     "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC
-    | {"advice", "generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
+    | {"advice", "excursions", "generate", "geometry", "interface", "native", "override", "reference", "simulate"}
+    | {"status"},
     "cost": SPEC | {"emit", "logs", "native", "status"},
     "selftest": SPEC
     | {"emit", "filters", "fixed", "generate", "geometry", "ir", "logs", "native", "reference", "scalars", "simulate"}
     | {"status"},
     "layouts": {"emit"},
     "commands": SPEC
-    | {"advice", "check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference"}
+    | {"advice", "check", "cost", "excursions", "files", "generate", "layouts", "logs", "native", "override", "plot"}
+    | {"reference"}
     | {"seal", "selftest", "simulate", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},

@@ -13,10 +13,10 @@ from typing import Protocol
 
 from kfgen.fixed.ranges.box import Box, clipped
 from kfgen.fixed.ranges.generator import Random
-from kfgen.fixed.ranges.legs import LEGS, Leg, at, legs
+from kfgen.fixed.ranges.legs import INNER, Leg, at, legs
 from kfgen.fixed.ranges.weather import Weather
 
-ROWS = 30  # of a leg, beside those without readings
+ROWS = 40  # of a leg, beside those without readings
 DARK = 6  # the row from which on a dark leg has none
 HELD = 6  # rows for which an input keeps its value, at least
 
@@ -63,10 +63,10 @@ class Drive:
         self.model = weather.model
         self.seen: dict[str, Seen] = {}
 
-    def run(self, player: Player, seed: int, count: int = LEGS, rows: int = ROWS) -> None:
+    def run(self, player: Player, seed: int, inner: int = INNER, rows: int = ROWS) -> None:
         """All legs."""
         random = Random(seed)
-        for k, leg in enumerate(legs(self.model, self.box, random, count)):
+        for k, leg in enumerate(legs(self.model, self.box, random, inner)):
             self._leg(player, leg, k, rows, random)
 
     def _leg(self, player: Player, leg: Leg, k: int, rows: int, random: Random) -> None:
@@ -140,7 +140,8 @@ class Drive:
         if span is None:
             return weather.nominal * (0.9 + 0.2 * random.random())
         if leg.corner:
-            return span[int(leg.places["dt"] < 0.5) if row // HELD % 3 == 2 else int(leg.places["dt"] >= 0.5)]
+            other = row >= DARK + self.outage and row // HELD % 3 == 2
+            return span[int((leg.places["dt"] >= 0.5) != other)]
         return at(span, random.random() ** 2) if row % 3 else weather.nominal
 
     def _reading(self, mode: int, k: int, random: Random) -> list[float]:

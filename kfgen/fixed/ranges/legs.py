@@ -9,10 +9,10 @@ from kfgen.fixed.ranges.box import Box, Span
 from kfgen.fixed.ranges.generator import Random
 from kfgen.model import Model
 
-LEGS = 24
-CORNER = 1 / 2  # the share of legs that begin and drive at the ends of everything
+INNER = 16  # legs that fill the box
+FEWEST, MOST = 8, 16  # corners
 NEAR = 1e-6  # of a range: how near to its end a corner is
-VANISHING = 1 / 32  # the same where the lower end of a parameter is 0, in every other leg
+VANISHING = 1 / 32  # the same where the lower end of a parameter is 0, in every other corner
 
 
 @dataclass
@@ -33,32 +33,49 @@ class Leg:
     vanishing: bool = False
 
 
-def legs(model: Model, box: Box, random: Random, count: int = LEGS) -> Iterator[Leg]:
-    """Legs all over the box of a filter."""
-    names = [*(f"x.{s}" for s in model.states), *(f"p.{name}" for name, _ in model.parameters),
-             *(f"u.{name}" for name in model.inputs), "dt"]  # fmt: skip
-    cube = {name: _shuffled(count, random) for name in names}
-    places: dict[str, float] = {}
-    for k in range(count):
-        corner = k < CORNER * count
-        if corner and k % 2:
-            places = {name: 1.0 - place for name, place in places.items()}  # the opposite corner
-        else:
-            places = {name: (cube[name][k] + random.random()) / count for name in names}
-        if corner:
-            places = {name: float(place >= 0.5) for name, place in places.items()}
+def legs(model: Model, box: Box, random: Random, inner: int = INNER) -> Iterator[Leg]:
+    """Legs all over the box of a filter: corners first, each with an outage.
+
+    Of parameters and dt all ends meet, as far as there are corners enough; they decide how a covariance grows.
+    """
+    slow = [*(f"p.{name}" for name in box.parameters), *(["dt"] if box.dt else [])]
+    quick = [f"x.{s}" for s in model.states] + [f"u.{name}" for name in model.inputs] + ["dt"]
+    corners = _corners(slow, quick, random)
+    names = [*quick, *(f"p.{name}" for name in box.parameters)]
+    cube = {name: _shuffled(inner, random) for name in names}
+    for k in range(len(corners) + inner):
+        corner, j = k < len(corners), k - len(corners)
+        places = corners[k] if corner else {name: (cube[name][j] + random.random()) / inner for name in names}
         x = []
         for i, (state, start) in enumerate(zip(model.states, model.x0, strict=True)):
             span = box.states[i]
             x.append(float(start) if span is None else at(span, places[f"x.{state}"]))
         parameters = {name: float(value) for name, value in model.parameters}
-        vanishing = k % 5 == 1 and any(span[0] == 0 for span in box.parameters.values())
+        vanishing = corner and k % 2 == 1 and any(span[0] == 0 for span in box.parameters.values())
         for name, span in box.parameters.items():
             place = places[f"p.{name}"]
             if span[0] == 0:
                 place = max(place, 0.0 if vanishing else VANISHING)
             parameters[name] = span[0] if place == 0 == span[0] else at(span, place)
-        yield Leg(corner, k % 4 < 2, k % 3 == 2, x, parameters, places, vanishing)
+        yield Leg(corner, k % 4 < 2, corner or k % 3 == 2, x, parameters, places, vanishing)
+
+
+def _corners(slow: list[str], quick: list[str], random: Random) -> list[dict[str, float]]:
+    """Ends of all quantities: of the slow ones in all combinations or in many, of the quick ones by chance."""
+    every = 1 << len(slow)
+    count = min(max(every, FEWEST), MOST)
+    chosen = _shuffled(every, random) if every <= count else [0, every - 1] + [
+        int(random.random() * every) for _ in range(count - 2)
+    ]  # fmt: skip
+    out: list[dict[str, float]] = []
+    for k in range(count):
+        if k % 2 and out:  # the opposite corner
+            places = {name: 1.0 - place for name, place in out[-1].items()}
+        else:
+            places = {name: float(random.random() >= 0.5) for name in quick}
+        ends = chosen[k % len(chosen)]
+        out.append(places | {name: float(ends >> i & 1) for i, name in enumerate(slow)})
+    return out
 
 
 def _shuffled(count: int, random: Random) -> list[int]:
