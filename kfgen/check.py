@@ -11,6 +11,7 @@ type can carry, so that what differs is the filters' own arithmetic.
   is allowed, if that is more. Once that departs by more than the tolerance, nothing is left to compare: such a row is
   counted, and all go on from the first reference.
 * The error of P_ij is relative to sqrt(P_ii P_jj), in fixed point less one LSB of P at the interface.
+* Rows whose truth is outside of its declared range tell nothing of a fixed-point filter: they are counted too.
 * Where eight roundings of a float of x's size exceed a tenth of its standard deviation in most rows, what is compared
   tells nothing of that state any more: the check fails, and says which.
 * A decision at a threshold (a gate, a robust weight) may fall differently by round-off. Such a difference is
@@ -25,11 +26,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kfgen.advice.resolution import too_coarse, ulp
+from kfgen.advice.grain import Grain
+from kfgen.excursions import rows_outside
 from kfgen.geometry import part_of
 from kfgen.interface import Array, Filter
 from kfgen.native.run import Plan, plan
-from kfgen.scalar_names import DOUBLE, FLOAT
+from kfgen.scalar_names import DOUBLE, FLOAT, is_fixed
 from kfgen.simulate import simulate
 from kfgen.spec.sensors import readings_of
 from kfgen.spec.types import Spec
@@ -85,12 +87,13 @@ class Outcome:
     lost: int  # rows that could not be compared for it
     certificate: tuple[str, ...] = ()  # fixed point: operations proved to fit, guarded, at risk
     coarse: tuple[str, ...] = ()  # states that a float of their size resolves too coarsely
+    outside: int = 0  # fixed point: rows that are outside of what the spec declares, and are not compared
 
     @property
     def passed(self) -> bool:
         few = len(self.differences) <= DIFFERENT_DECISIONS * self.calls
         close = self.x.error <= max(self.tolerance, 8 * self.resolution) and self.P.error <= self.tolerance
-        return close and few and not self.errors_differ and not self.coarse
+        return close and few and not self.errors_differ and not self.coarse and self.outside < self.steps
 
 
 def check(spec: Spec, steps: int = STEPS, seed: int = SEED, generated: Generated | None = None) -> Outcome:
@@ -120,7 +123,9 @@ def compare(
     """Run the filters side by side over a simulated track of `steps` rows; `coarse` is a second reference."""
     spec = kf.spec
     every = {sensor.name: 1 + i for i, sensor in enumerate(spec.measurements)}
-    work = _rounded(kf, plan(spec, simulate(spec, steps, seed, every, GAPS)))
+    log = simulate(spec, steps, seed, every, GAPS)
+    work = _rounded(kf, plan(spec, log))
+    outside = rows_outside(spec, log.columns) & is_fixed(spec.scalar)
     random = np.random.default_rng(seed)
     x, P, rounding = Worst(), Worst(), Worst()
     kf.init()
@@ -131,7 +136,7 @@ def compare(
     differences: list[str] = []
     calls, lost, errors_differ = 0, 0, False
     tolerance = tolerance_of(spec.scalar)
-    grain = _Grain(list(spec.errors), spec.code.compensated) if spec.scalar == FLOAT else None
+    grain = Grain(list(spec.errors), spec.code.compensated) if spec.scalar == FLOAT else None
     for row in range(steps):
         for call in _calls(spec, work, row, random):
             ours, theirs = _made(kf, call), _made(ref, call)
@@ -140,10 +145,15 @@ def compare(
                 coarse.displace(scales.rounded)
             calls += 1
             if (ours ^ theirs) & ~Status.REGULARIZED:  # where a pivot is zero depends on the factorisation
+                _follow(ref, kf, coarse)
+                if outside[row]:
+                    continue
                 text = f"{call.sensor or 'predict'} of step {row + 1}: {describe(ours)}, reference {describe(theirs)}"
                 differences.append(text)
                 errors_differ |= ours >= ERROR or theirs >= ERROR
-                _follow(ref, kf, coarse)
+        if outside[row]:
+            _follow(ref, kf, coarse)
+            continue
         if grain is not None:
             grain.see(ref.model.space.flat(ref.x), ref.P)
         departs = scales.x_errors(coarse.x, ref.x, ref.P)
@@ -156,7 +166,7 @@ def compare(
         P.see(scales.P_errors(kf.P, ref.P), scales.pairs, row)
     return Outcome(
         kf.name, spec.scalar, steps, calls, x, P, tuple(differences), errors_differ, tolerance,
-        rounding.error, lost, coarse=grain.coarse() if grain is not None else (),
+        rounding.error, lost, coarse=grain.coarse() if grain is not None else (), outside=int(outside.sum()),
     )  # fmt: skip
 
 
@@ -218,31 +228,6 @@ def _rounded(kf: NativeFilter, work: Plan) -> Plan:
         u=scalar.to_physical(scalar.to_raw(work.u, units.u), units.u),
         z=scalar.to_physical(scalar.to_raw(work.z, units.readings), units.readings),
     )
-
-
-class _Grain:
-    """What a float's resolution is against the standard deviations along the track."""
-
-    def __init__(self, names: list[str], compensated: tuple[str, ...]) -> None:
-        self.names = names
-        self._whole = np.array([name in compensated for name in names])  # what two floats hold
-        self._x: list[Array] = []
-        self._sigma: list[Array] = []
-
-    def see(self, x: Array, P: Array) -> None:
-        self._x.append(x)
-        self._sigma.append(np.sqrt(np.maximum(np.diag(P), 0.0)))
-
-    def coarse(self) -> tuple[str, ...]:
-        """A sentence for each state that most rows resolve too coarsely."""
-        x, sigma = np.abs(self._x), np.array(self._sigma)
-        most = (too_coarse(x, sigma).mean(axis=0) > 0.5) & ~self._whole
-        size, spread = np.median(x, axis=0), np.median(sigma, axis=0)
-        return tuple(
-            f"{self.names[i]}: float resolves {size[i]:.3g} to {ulp(size[i]):.2g}, beside a standard deviation of "
-            f"{spread[i]:.2g}: count it from a local origin, or write scalar: double"
-            for i in np.flatnonzero(most)
-        )
 
 
 class _Scales:

@@ -60,6 +60,11 @@ def report(outcome: Outcome) -> list[Part]:
         remarks.append(f"a reference with its x rounded to {outcome.scalar}: {outcome.resolution:.1e} sigma")
     if outcome.lost:
         remarks.append(f"{outcome.lost} steps not compared: rounding alone moves the reference further than that")
+    if outcome.outside:
+        remarks.append(
+            f"{outcome.outside} steps not compared: there the model's own track is outside of what the spec declares "
+            f"(`kfgen simulate` says where); widen the ranges, or the filter is not made for it"
+        )
     remarks += outcome.coarse
     return [
         f"{outcome.name} ({outcome.scalar}): {outcome.steps} steps, {outcome.calls} calls against the reference",

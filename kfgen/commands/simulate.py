@@ -57,14 +57,19 @@ def simulate(
 
     The first state is drawn from N(x0, P0), and so are all noises. Inputs are slow sines within a quarter of
     their range (of amplitude 1 where they have none). A run-time dt is the nominal one with 10 % of jitter.
+    Where the truth leaves a declared range, a warning says so.
 
     With --delay each reading of the sensor stands in the first row at or after its arrival; the column <sensor>.age
     says in s how old it is then.
     """
     from kfgen import simulate as simulation
+    from kfgen.excursions import excursions
     from kfgen.late import delayed
     from kfgen.logs import write
 
     keep_apart({"the spec": spec}, {"-o": out})
     loaded = load_spec(spec)
-    write(out, delayed(loaded, simulation.simulate(loaded, steps, seed, every), delays).columns)
+    log = simulation.simulate(loaded, steps, seed, every)
+    write(out, delayed(loaded, log, delays).columns)
+    for warning in excursions(loaded, log.columns):
+        click.echo(warning, err=True)

@@ -17,6 +17,7 @@ from kfgen.fixed.formats.report import periods, table, units
 from kfgen.fixed.linear import linear
 from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
+from kfgen.fixed.program.inline import inlined
 from kfgen.fixed.program.unroll import unrolled
 from kfgen.fixed.ranges.box import Box
 from kfgen.fixed.ranges.drive import Drive, Seen
@@ -35,8 +36,11 @@ from kfgen.ir.nodes import Node
 from kfgen.logs import Log
 
 WIDER = 2.0**6  # times what runs have met: an interval that is wider than that has overrated its value
-DRIVEN, TRIED = 21, 31  # seeds of the runs over the box
-LEGS, ROWS = 8, 12  # of the trial
+DRIVEN, TRIED = 21, 31  # seeds of the runs over the box, of the first trial
+TRIALS = 4  # each with runs of its own, until nothing saturates
+INNER, ROWS = 8, 40  # of a trial
+OUTAGES = (24, 12, 4, 0)  # rows without readings
+SHORT = 12  # what is less than that is told of
 
 
 @dataclass(frozen=True)
@@ -64,22 +68,28 @@ def build_fixed(code: FilterCode, scalar: Fixed, logs: Sequence[Log] = ()) -> Fi
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the declared box: that where no variance is beyond its limit; none: all of it.
+    """A part of the declared box, and for how many rows there may be no reading in it.
 
-    spare: bits of further head-room for covariances, for corners that no run has been in.
+    limits: variances at which a state is as good as unknown. spare: bits of further head-room for covariances, for
+    corners that no run has been in.
     """
 
     box: Box
+    outage: int
     limits: Sequence[float] = ()
     spare: int = 0
 
 
-def _less(part: Part, reason: SpecError) -> tuple[str, ...]:
+def _less(part: Part, whole: Box, reason: SpecError) -> tuple[str, ...]:
     """What is said of a filter that holds in a part of its box only."""
-    where = "where a standard deviation is within half of its state's range"
-    if not any(part.box.states):
-        where += ", and states near where the model itself leads"
-    return (f"holds {where}, not in all of the declared ranges: {reason.mistakes[0].message}",)
+    where = []
+    if part.outage < SHORT:
+        where.append(f"for at most {part.outage} steps without readings" if part.outage else "without outages")
+    if part.box != whole:
+        where.append("for states near where the model itself leads")
+    mistake = reason.mistakes[0]
+    why = f"not in all of the declared ranges: {mistake.message}; {mistake.hint}"
+    return (f"holds {' and '.join(where)}, {why}",) if where else ()
 
 
 @dataclass(frozen=True)
@@ -96,7 +106,7 @@ class _Builder:
 
     def __init__(self, code: FilterCode, scalar: Fixed, logs: Sequence[Log]) -> None:
         self.scalar = scalar
-        self.real = replace(code, functions=tuple(unrolled(f, code.constants) for f in code.functions))
+        self.real = replace(code, functions=tuple(unrolled(f, code.constants) for f in inlined(code.functions)))
         self.functions = list(self.real.functions)
         self.arrays, self.ranges = find_arrays(self.functions), Ranges()
         self.program = RealProgram(self.functions, self.arrays, self.ranges)
@@ -109,23 +119,28 @@ class _Builder:
         self.sizes: Mapping[Node, float] = {}
 
     def build(self) -> FixedFilter:
-        if not self.box.wide:
-            found = self._lowered(0)
-            self._judged(found)
-            return self._filter(found)
         refusals: list[SpecError] = []
-        box, known = self.box, unknown(self.box)
-        for part in (Part(box, spare=1), Part(box), Part(box, known), Part(box.without_states(), known)):
+        for part in self._parts():
             self.ranges.restore(self.met)
-            drive = Drive(self.weather, part.box)
-            self._see(drive, part)
+            drive = Drive(self.weather, part.box, part.outage)
+            if self.box.wide:
+                self._see(drive, part)
             try:
                 made = self._toured(drive, part)
             except SpecError as error:
                 refusals.append(error)
             else:
-                return made if not part.limits else replace(made, told=(*made.told, *_less(part, refusals[0])))
+                return made if not refusals else replace(made, told=(*made.told, *_less(part, self.box, refusals[0])))
         raise refusals[0]
+
+    def _parts(self) -> list[Part]:
+        """From all that is wanted to the least that is of use."""
+        box, longest = self.box, OUTAGES[0]
+        if not box.wide:
+            return [Part(box, outage) for outage in OUTAGES]
+        known = unknown(box, [float(row[i]) for i, row in enumerate(self.real.model.P0)])
+        return [Part(box, longest, known, spare=1), *(Part(box, outage, known) for outage in OUTAGES),
+                Part(box.without_states(), 0, known)]  # fmt: skip
 
     def _see(self, drive: Drive, part: Part) -> None:
         """Runs over a part of the box, and what intervals say of it."""
@@ -137,24 +152,18 @@ class _Builder:
 
     def _toured(self, drive: Drive, part: Part) -> FixedFilter:
         """A filter that has been tried all over a part; what its trial has met counts where something saturated."""
-        for last in (False, True):
-            met = self._lowered(part.spare)
-            try:
-                self._judged(met)
-            except SpecError:
-                if last:  # what the first one was short of costs more than there is
-                    break
-                raise
-            found = met
+        for trial in range(TRIALS):
+            found = self._lowered(part.spare)
+            told = self._judged(found)
             tour = Tour(self.program, found.program, self.real, found.formats, found.code, self.box, part.limits)
-            drive.run(tour, TRIED, LEGS, ROWS)
-            if last or not tour.found.saturated:
+            drive.run(tour, TRIED + trial, INNER, ROWS)
+            if not tour.found.saturated:
                 break
         if not tour.found.carried:
             shaken = ShakenTour(self.program, self.real, found.formats, self.box, part.limits)
-            drive.run(shaken, TRIED, LEGS, ROWS)
+            drive.run(shaken, TRIED + trial, INNER, ROWS)
             refuse(tour.found, shaken.found, self.real, found.formats, self.scalar)
-        return replace(self._filter(found), widest=dict(drive.seen))
+        return replace(self._filter(found), widest=dict(drive.seen) if self.box.wide else {}, told=told)
 
     def _lowered(self, spare: int) -> _Lowered:
         hear(self.real.model.spec, self.runner.heard)
@@ -164,8 +173,8 @@ class _Builder:
         code = lower(self.real, formats)
         return _Lowered(code, formats, IntegerProgram(list(code.functions), self.arrays, self.scalar))
 
-    def _judged(self, found: _Lowered) -> None:
-        judge(self.program, self.real, found.program, found.code, found.formats, self.scalar, self.weather)
+    def _judged(self, found: _Lowered) -> tuple[str, ...]:
+        return judge(self.program, self.real, found.program, found.code, found.formats, self.scalar, self.weather)
 
     def _filter(self, found: _Lowered) -> FixedFilter:
         """What is handed on."""

@@ -23,6 +23,27 @@ def log(kfgen):
     return "log.csv"
 
 
+def test_simulate_says_where_the_truth_leaves_a_range(kfgen, tmp_path):
+    text = """
+kfgen: 1
+name: wander
+scalar: q16.16
+dt: 0.1
+states: {p: {init: 0, std: 5, range: [-20, 20]}, v: {init: 0, std: 2}}
+dynamics: {f: {p: p + dt*v}, Q: {v: 0.5}}
+measurements: {m: {z: {p: {h: p, std: 0.5}}}}
+filter: {type: kf}
+"""
+    (tmp_path / "wander.yaml").write_text(text)
+    done = kfgen("simulate", "wander.yaml", "-o", "wander.csv", "--steps", "300")
+    assert done.exit_code == 0
+    assert "warning: states.p: the simulated `p` goes from" in done.stderr
+    assert "outside of its range [-20, 20] in 80.7% of the rows" in done.stderr
+    assert "`v`" not in done.stderr
+    (tmp_path / "wander.yaml").write_text(text.replace("20, 20", "2000, 2000"))
+    assert kfgen("simulate", "wander.yaml", "-o", "wander.csv").stderr == ""
+
+
 def test_simulate_writes_the_same_log_for_a_seed(kfgen, log):
     first = Path(log).read_bytes()
     rows = rows_of(first.decode())

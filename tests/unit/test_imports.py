@@ -31,6 +31,7 @@ ALLOWED = {
     # the spec, and what reads only it
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
+    "excursions": {"errors", "spec"},
     "logs": SPEC | {"files"},
     "late": SPEC | {"logs"},
     "reference": {"errors", "spec"},
@@ -51,7 +52,8 @@ ALLOWED = {
     "native": SPEC | {"emit", "files", "generate", "late", "logs", "override", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC
-    | {"advice", "generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
+    | {"advice", "excursions", "generate", "geometry", "interface", "native", "override", "reference", "simulate"}
+    | {"status"},
     "cost": SPEC | {"emit", "logs", "native", "status"},
     "selftest": SPEC
     | {"emit", "filters", "fixed", "generate", "geometry", "ir", "logs", "native", "reference", "scalars", "simulate"}
@@ -60,8 +62,8 @@ ALLOWED = {
     "difference": SPEC | {"generate", "geometry", "logs", "native"},
     "tools": {"__init__", "errors", "native"},
     "commands": SPEC
-    | {"advice", "check", "cost", "difference", "examples", "files", "generate", "late", "layouts", "logs", "native"}
-    | {"override", "plot", "reference", "seal", "selftest", "simulate", "status", "tools"},
+    | {"advice", "check", "cost", "difference", "examples", "excursions", "files", "generate", "late", "layouts"}
+    | {"logs", "native", "override", "plot", "reference", "seal", "selftest", "simulate", "status", "tools"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
     "__main__": {"cli"},

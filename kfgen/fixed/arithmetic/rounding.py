@@ -7,6 +7,8 @@ from math import floor
 
 from kfgen.fixed.arithmetic.limits import LIMIT
 
+SMALLEST = -1022
+
 
 def rounded(value: Fraction, e: int) -> int:
     """value / 2^e to the nearest integer that fits."""
@@ -23,8 +25,10 @@ def nearest(value: Fraction, e: int) -> int:
 
 
 def size_of(value: Fraction) -> int:
-    """The least k with |value| < 2^k."""
+    """The least k with |value| < 2^k; of 0 that of the smallest float."""
     magnitude = abs(value)
+    if magnitude == 0:
+        return SMALLEST
     k = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
     while magnitude >= power(k):
         k += 1

@@ -102,7 +102,7 @@ class Carry:
                 return self._scaled(self.long(node.args[0], cell), MINUS)
             case "mul" if path.depth(node) is not None:
                 a, b = path.ordered(node.args)
-                taken = self._taken(b)
+                taken = self._taken(a, b)
                 if taken is not None:
                     return self._plus(self.long(a, cell), -1, taken, e)
                 factor = self.x.factor(b)
@@ -138,7 +138,7 @@ class Carry:
             total = self._plus(total, sign, factors, e)
         return total
 
-    def _taken(self, ratio: Node) -> tuple[Node, Node] | None:
+    def _taken(self, D: Node, ratio: Node) -> tuple[Node, Node] | None:
         """Where D is multiplied by s / (s + f v), v = f D, the factors v and v / (s + f v) of what that takes from D.
 
         f v can be below the LSB that s and the ratio have, and yet be what D is to lose.
@@ -151,12 +151,21 @@ class Carry:
         if whole.op != "sum" or not any(len(f) == 1 and same(f[0], before) for _, f in terms(whole)):
             return None
         for _, factors in terms(whole):
-            for v in factors if len(factors) == 2 else ():
-                for name, node in self.c.nodes.items() if v.op == "variable" else ():
+            if len(factors) < 2:
+                continue
+            for v, f in (factors, factors[::-1]):  # where f is weighed, v is not f D
+                for name, node in self.c.nodes.items() if self._is_product(v, f, D) else ():
                     found = self._quotient(node)
                     if found is not None and same(found[0], v) and same(found[1], after):
                         return v, make("variable", (), name)
         return None
+
+    def _is_product(self, v: Node, a: Node, b: Node) -> bool:
+        product = self.x.definition(v)
+        if v.op != "variable" or product.op != "mul":
+            return False
+        one, two = product.args
+        return (same(one, a) and same(two, b)) or (same(one, b) and same(two, a))
 
     def _quotient(self, node: Node) -> tuple[Node, Node] | None:
         """Numerator and denominator, of a division or of a product with a reciprocal; whatever guards it."""
@@ -204,7 +213,7 @@ class Carry:
 
     def _gathered(self, total: Node, a: Raw, b: Raw, e: int) -> Node:
         s = e - a.e - b.e
-        if -CARRIED <= s < 0 and a.size << -s > LIMIT and a.node.constant is None and b.node.constant is None:
+        if s < 0 and a.size << min(-s, BITS) > LIMIT and a.node.constant is None and b.node.constant is None:
             # in the cell's own format it fits where the cell does; shifted by so much, a factor may not
             a = self.x.scaled_product(a, b, e + CARRIED)
             b = Raw(constant(ONE), -CARRIED, ONE, ONE)

@@ -8,6 +8,7 @@ from kfgen.fixed.arithmetic.limits import BITS, LIMIT
 from kfgen.fixed.arithmetic.rounding import nearest, size_of
 from kfgen.fixed.lowering.raw import QTable, Raw
 from kfgen.fixed.lowering.sums import Sums
+from kfgen.fixed.program.cells import is_variance
 from kfgen.fixed.program.nodes import integer, make, same, terms
 from kfgen.ir.nodes import Node
 
@@ -80,6 +81,9 @@ class Functions(Sums):
             for r in raws[1:]:
                 total = Raw(make("q_hypot", (total.node, r.node)), shared, 0, LIMIT)
             return total
+        factors = node.args[0].args
+        if node.args[0].op == "mul" and all(a.op == "element" and is_variance(a.data, a.args[0]) for a in factors):
+            return self.value(make("mul", tuple(make("sqrt", (a,)) for a in factors)), e)  # their product is too small
         a = self.value(node.args[0])
         if e is None:
             e = (a.e - BITS) // 2 + 1

@@ -25,6 +25,8 @@ class Products(Quotients):
 
     def product(self, node: Node, e: int | None) -> Raw:
         a, b = self.constant_first(node.args)
+        if a.constant == 0:
+            return self.literal(Fraction(0), e)
         if a.constant is not None and not self._inverse_of(b):
             exact = self.literal(a.constant, None)
             if abs(int(exact.node.constant or 0)) == 1:
@@ -41,6 +43,9 @@ class Products(Quotients):
                 e = max(e, self.value(a).e + self.value(b).e + USEFUL)
             else:
                 e = max(e, self.value(b).e + size_of(a.constant) - 4)
+        elif fine:
+            finest = self._finest(node, a, b)
+            e = e if finest is None else max(e, finest)
         return self._product(a, b, e)
 
     def _guess(self, factors: tuple[Node, ...]) -> int:
@@ -82,8 +87,9 @@ class Products(Quotients):
         return Raw(make("q_mul", (a.node, b.node), (s,)), e, max(low, -LIMIT), min(high, LIMIT))
 
     def scaled_product(self, a: Raw, b: Raw, e: int) -> Raw:
-        """a b at e, which is no finer than the product is."""
-        return self._mul(a, b, e - a.e - b.e, e)
+        """a b at e."""
+        s = e - a.e - b.e
+        return self._mul(a, b, s, e) if 0 <= s <= 62 else self._shifted_product(a, b, e)
 
     def _within(self, a: Raw, b: Raw, s: int, most: int | None) -> tuple[Raw, Raw, int, int | None]:
         """Factors of which one has so few digits that s is at most LAST: it costs 1/8 of the product's LSB."""

@@ -13,12 +13,11 @@ from typing import Protocol
 
 from kfgen.fixed.ranges.box import Box, Span, clipped
 from kfgen.fixed.ranges.generator import Random
-from kfgen.fixed.ranges.legs import LEGS, Leg, at, legs
+from kfgen.fixed.ranges.legs import INNER, Leg, at, legs
 from kfgen.fixed.ranges.weather import Weather
 
-ROWS = 30  # of a leg
-DARK = 0.2  # the share of its rows after which a dark leg has no readings
-BLINK = 10  # rows without readings at a corner
+ROWS = 40  # of a leg, beside those without readings
+DARK = 6  # the row from which on a dark leg has none
 HELD = 6  # rows for which an input keeps its value, at least
 
 
@@ -36,7 +35,7 @@ class Seen:
 class Player(Protocol):
     """What a drive is made with: a filter, or several side by side."""
 
-    def begin(self, fresh: bool, parameters: Mapping[str, float]) -> None:
+    def begin(self, leg: Leg) -> None:
         """A leg begins, with a filter as it is after init or with what the leg before has left."""
         ...
 
@@ -49,36 +48,38 @@ class Player(Protocol):
         ...
 
     def row(self, inputs: Mapping[str, float], dt: float, readings: Mapping[str, Sequence[float]], k: int) -> bool:
-        """A step and its updates; False where the leg is to end."""
+        """A step and its updates; False, and nothing done, where the leg is to end."""
         ...
 
 
 class Drive:
-    """Makes the legs of a filter, row by row."""
+    """Makes the legs of a filter, row by row. outage: the rows of a dark leg that have no readings."""
 
-    def __init__(self, weather: Weather, box: Box) -> None:
+    def __init__(self, weather: Weather, box: Box, outage: int) -> None:
         self.weather = weather
         self.box = box
+        self.outage = outage
         self.truth = weather.truth
         self.model = weather.model
         self.seen: dict[str, Seen] = {}
 
-    def run(self, player: Player, seed: int, count: int = LEGS, rows: int = ROWS) -> None:
+    def run(self, player: Player, seed: int, inner: int = INNER, rows: int = ROWS) -> None:
         """All legs."""
         random = Random(seed)
-        for k, leg in enumerate(legs(self.model, self.box, random, count)):
+        for k, leg in enumerate(legs(self.model, self.box, random, inner)):
             self._leg(player, leg, k, rows, random)
 
     def _leg(self, player: Player, leg: Leg, k: int, rows: int, random: Random) -> None:
         truth, n = self.truth, self.truth.n
-        player.begin(leg.fresh, leg.parameters)
+        player.begin(leg)
         truth.begin(random)
         truth.memory.numbers.update({f"kf.parameters.{name}": value for name, value in leg.parameters.items()})
         off = [a - float(b) for a, b in zip(truth.x, self.model.x0, strict=True)] if leg.fresh else [0.0] * truth.nx
         truth.place(leg.x, [0.0] * n)
         self._place(player, [a + e for a, e in zip(leg.x, off, strict=True)])
         mode = k % self.weather.modes
-        for row in range(rows):
+        dark = range(DARK, DARK + self.outage) if leg.dark else range(0)
+        for row in range(rows + len(dark)):
             if row == rows // 2:
                 mode = (mode + 1) % self.weather.modes
             inputs, dt = self._inputs(leg, row, random), self._dt(leg, row, random)
@@ -93,12 +94,12 @@ class Drive:
                 return
             if any(truth.cut):  # and the estimate with it
                 self._place(player, [a - c for a, c in zip(player.estimate(), truth.cut, strict=True)])
-            end = DARK * rows + BLINK if leg.corner else rows - 2  # at the ends of everything variances grow fast
-            dark = leg.dark and DARK * rows <= row < end
-            sensors = () if dark else self.model.sensors
+            sensors = () if row in dark else self.model.sensors
             readings = {s.name: self._reading(leg, row, mode, i, random) for i, s in enumerate(sensors)}
             if not player.row(inputs, dt, readings, row):
-                return
+                if row not in dark:
+                    return
+                dark = range(0)  # too much is unknown: the readings are back
             self._note(leg, inputs, dt)
 
     def _place(self, player: Player, x: Sequence[float]) -> None:
@@ -141,7 +142,8 @@ class Drive:
         if span is None:
             return weather.nominal * (0.9 + 0.2 * random.random())
         if leg.corner:
-            return span[int(leg.places["dt"] < 0.5) if row // HELD % 3 == 2 else int(leg.places["dt"] >= 0.5)]
+            other = row >= DARK + self.outage and row // HELD % 3 == 2
+            return span[int((leg.places["dt"] >= 0.5) != other)]
         return at(span, random.random() ** 2) if row % 3 else weather.nominal
 
     def _reading(self, leg: Leg, row: int, mode: int, k: int, random: Random) -> list[float]:

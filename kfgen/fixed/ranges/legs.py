@@ -9,10 +9,10 @@ from kfgen.fixed.ranges.box import Box, Span
 from kfgen.fixed.ranges.generator import Random
 from kfgen.model import Model
 
-LEGS = 16
-CORNER = 1 / 2  # the share of legs that begin and drive at the ends of everything
+INNER = 16  # legs that fill the box
+FEWEST, MOST = 8, 16  # corners
 NEAR = 1e-6  # of a range: how near to its end a corner is
-VANISHING = 1 / 32  # the same where the lower end of a parameter is 0: what a noise of nothing leaves has no size
+VANISHING = 1 / 32  # the same where the lower end of a parameter is 0, in every other corner
 
 
 @dataclass
@@ -20,7 +20,8 @@ class Leg:
     """Where one begins, what it is given: parameters by name, and what a row draws inputs and dt from.
 
     places: of each quantity in [0, 1], where it is kept around; 0 and 1 are the ends. fresh: with the covariance of the
-    first estimate, and not with what the leg before has left.
+    first estimate, and not with what the leg before has left. vanishing: a parameter may be 0, and what a noise of
+    nothing leaves has no size.
     """
 
     corner: bool
@@ -29,31 +30,53 @@ class Leg:
     x: list[float]
     parameters: dict[str, float]
     places: dict[str, float] = field(default_factory=dict)
+    vanishing: bool = False
 
 
-def legs(model: Model, box: Box, random: Random, count: int = LEGS) -> Iterator[Leg]:
-    """Legs all over the box of a filter."""
-    names = [*(f"x.{s}" for s in model.states), *(f"p.{name}" for name, _ in model.parameters),
-             *(f"u.{name}" for name in model.inputs), "dt",
-             *(f"z.{s.name}.{name}" for s in model.sensors for name in s.inputs)]  # fmt: skip
-    cube = {name: _shuffled(count, random) for name in names}
-    places: dict[str, float] = {}
-    for k in range(count):
-        corner = k < CORNER * count
-        if corner and k % 2:
-            places = {name: 1.0 - place for name, place in places.items()}  # the opposite corner
-        else:
-            places = {name: (cube[name][k] + random.random()) / count for name in names}
-        if corner:
-            places = {name: float(place >= 0.5) for name, place in places.items()}
+def legs(model: Model, box: Box, random: Random, inner: int = INNER) -> Iterator[Leg]:
+    """Legs all over the box of a filter: corners first, each with an outage.
+
+    Of parameters and dt all ends meet, as far as there are corners enough; they decide how a covariance grows.
+    """
+    slow = [*(f"p.{name}" for name in box.parameters), *(["dt"] if box.dt else [])]
+    quick = [f"x.{s}" for s in model.states] + [f"u.{name}" for name in model.inputs] + ["dt"]
+    quick += [f"z.{s.name}.{name}" for s in model.sensors for name in s.inputs]
+    corners = _corners(slow, quick, random)
+    names = [*quick, *(f"p.{name}" for name in box.parameters)]
+    cube = {name: _shuffled(inner, random) for name in names}
+    for k in range(len(corners) + inner):
+        corner, j = k < len(corners), k - len(corners)
+        places = corners[k] if corner else {name: (cube[name][j] + random.random()) / inner for name in names}
         x = []
         for i, (state, start) in enumerate(zip(model.states, model.x0, strict=True)):
             span = box.states[i]
             x.append(float(start) if span is None else at(span, places[f"x.{state}"]))
         parameters = {name: float(value) for name, value in model.parameters}
+        vanishing = corner and k % 2 == 1 and any(span[0] == 0 for span in box.parameters.values())
         for name, span in box.parameters.items():
-            parameters[name] = at(span, places[f"p.{name}"], VANISHING if span[0] == 0 else NEAR)
-        yield Leg(corner, k % 4 < 2, k % 3 == 2, x, parameters, places)
+            place = places[f"p.{name}"]
+            if span[0] == 0:
+                place = max(place, 0.0 if vanishing else VANISHING)
+            parameters[name] = span[0] if place == 0 == span[0] else at(span, place)
+        yield Leg(corner, k % 4 < 2, corner or k % 3 == 2, x, parameters, places, vanishing)
+
+
+def _corners(slow: list[str], quick: list[str], random: Random) -> list[dict[str, float]]:
+    """Ends of all quantities: of the slow ones in all combinations or in many, of the quick ones by chance."""
+    every = 1 << len(slow)
+    count = min(max(every, FEWEST), MOST)
+    chosen = _shuffled(every, random) if every <= count else [0, every - 1] + [
+        int(random.random() * every) for _ in range(count - 2)
+    ]  # fmt: skip
+    out: list[dict[str, float]] = []
+    for k in range(count):
+        if k % 2 and out:  # the opposite corner
+            places = {name: 1.0 - place for name, place in out[-1].items()}
+        else:
+            places = {name: float(random.random() >= 0.5) for name in quick}
+        ends = chosen[k % len(chosen)]
+        out.append(places | {name: float(ends >> i & 1) for i, name in enumerate(slow)})
+    return out
 
 
 def _shuffled(count: int, random: Random) -> list[int]:
@@ -64,8 +87,8 @@ def _shuffled(count: int, random: Random) -> list[int]:
     return order
 
 
-def at(span: Span, place: float, near: float = NEAR) -> float:
-    """The point of a span at a place in [0, 1], a little inside. near: how far from its lower end."""
+def at(span: Span, place: float) -> float:
+    """The point of a span at a place in [0, 1], a little inside."""
     low, high = span
-    place = min(max(place, near), 1.0 - NEAR)
+    place = min(max(place, NEAR), 1.0 - NEAR)
     return low + (high - low) * place

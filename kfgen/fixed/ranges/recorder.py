@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from kfgen.fixed.ranges.box import Box, clipped
+from kfgen.fixed.ranges.legs import Leg
 from kfgen.fixed.ranges.memory import blank
 from kfgen.fixed.ranges.runs import Runner
 
+BEGUN = 1.05  # times the first variance
 BEYOND = 1.0  # times the width of its range that an estimate may be outside of it
 
 
@@ -25,12 +27,12 @@ class Recorder:
         self.memory = self.before = blank(runner.code)
         runner.program.run("init", self.memory)
 
-    def begin(self, fresh: bool, parameters: Mapping[str, float]) -> None:
+    def begin(self, leg: Leg) -> None:
         runner = self.runner
-        if fresh:
+        if leg.fresh:
             self.memory = blank(runner.code)
             runner.program.run("init", self.memory)
-        for name, value in parameters.items():
+        for name, value in leg.parameters.items():
             self.memory.numbers[f"kf.parameters.{name}"] = value
             runner.ranges.see(("number", f"kf.parameters.{name}"), value)
 
@@ -61,7 +63,13 @@ def within(box: Box, x: Sequence[float], limits: Sequence[float], variances: Cal
     return not limits or all(v <= most for v, most in zip(variances(), limits, strict=True))
 
 
-def unknown(box: Box) -> list[float]:
-    """Variances (n) at which a state is as good as unknown: a deviation of half its span."""
+def unknown(box: Box, first: Sequence[float]) -> list[float]:
+    """Variances (n) at which a state is as good as unknown: a deviation of half its span, or what it begins with.
+
+    first (n): the variances at the start.
+    """
     spans = [None if i is None else box.states[i] for i in box.numbers]
-    return [math.inf if span is None else ((span[1] - span[0]) / 2) ** 2 for span in spans]
+    return [
+        math.inf if span is None else max(((span[1] - span[0]) / 2) ** 2, BEGUN * P)
+        for span, P in zip(spans, first, strict=True)
+    ]

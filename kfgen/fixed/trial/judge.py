@@ -14,29 +14,47 @@ from kfgen.fixed.ranges.generator import Random
 from kfgen.fixed.ranges.real import RealProgram
 from kfgen.fixed.ranges.weather import Weather
 from kfgen.fixed.trial.integers import IntegerProgram
-from kfgen.fixed.trial.probe import probe, shaken
-from kfgen.fixed.trial.tour import FAILING, WIDE, Found
+from kfgen.fixed.trial.probe import Departure, probe, shaken
+from kfgen.fixed.trial.tour import FAILING, MARGIN, WIDE, Found
 from kfgen.spec.types import Spec
 
 PROBED = 120  # rows that the integers are tried on
+CLOSE = 0.01  # standard deviations, and share of a variance: half of what `check` allows
 CHAOTIC = 16.0  # times as far as real numbers depart by less than what formats lose
 
 
 def judge(program: RealProgram, real: FilterCode, integers: IntegerProgram, integer: FilterCode, formats: Formats,
-          scalar: Fixed, weather: Weather) -> None:  # fmt: skip
-    """Try the integers beside the real numbers. SpecError where they do not follow."""
+          scalar: Fixed, weather: Weather) -> tuple[str, ...]:  # fmt: skip
+    """Try the integers beside the real numbers: what is to be said of them. SpecError where they do not follow."""
     log, rows = weather.log(PROBED, Random(11), Random(111))
     found = probe(program, real, integers, integer, formats, log, rows)
-    if found.sigmas <= FAILING and not found.errors:
-        return
-    if not found.errors and not found.beyond(shaken(program, real, formats, log, rows), FAILING, CHAOTIC):
-        return  # the model magnifies whatever is rounded
+    if found.sigmas <= CLOSE and found.share <= CLOSE and not found.errors:
+        return ()
+    model = shaken(program, real, formats, log, rows)
+    if not found.errors and not found.beyond(model, FAILING, CHAOTIC):
+        if not found.beyond(model, CLOSE, CHAOTIC) and found.share <= CLOSE:
+            return ()  # the model magnifies whatever is rounded
+        if found.share <= WIDE:
+            return _coarse(found, formats, real, scalar)
     state = real.model.spec.states[found.state]
     what, bits = _carrying(formats, found.state, real, scalar), _missing(found.sigmas)
     raise SpecError.at(
-        state.place, f"{what}; {bits} bit{'s' * (bits > 1)} are missing",
+        state.place, f"{what}; {bits} {'bits are' if bits > 1 else 'bit is'} missing",
         _cure(real, found.state, bits),
     )  # fmt: skip
+
+
+def _coarse(found: Departure, formats: Formats, real: FilterCode, scalar: Fixed) -> tuple[str, ...]:
+    """Of what is right, but not to the digits that a check along the model's own track wants."""
+    far = found.sigmas > CLOSE
+    i = found.state if far else found.widest
+    bits = math.ceil(math.log2(max(found.sigmas, found.share) / CLOSE))
+    largest, least = _spread(formats, i, len(real.model.states))
+    return (
+        f"{scalar.name} carries `{real.model.spec.states[i].name}` within {found.sigmas:.2g} standard deviations and "
+        f"{found.share:.1%} of its variance, where `check` wants {2 * CLOSE:.0%}: its standard deviation goes from "
+        f"{largest:.3g} to {least:.3g}; {bits} bit{'s' * (bits > 1)} missing; {_cure(real, i, bits)}",
+    )
 
 
 def hear(spec: Spec, heard: Collection[str]) -> None:
@@ -57,22 +75,42 @@ def refuse(found: Found, shaken: Found, real: FilterCode, formats: Formats, scal
 
     shaken: what digits that no format keeps make of the model there, which may magnify whatever is rounded.
     """
-    far = found.sigmas > max(FAILING, CHAOTIC * shaken.sigmas)
-    if not far and found.share <= max(WIDE, CHAOTIC * shaken.share) and not found.errors:
+    if found.saturated:
+        _saturated(found, real, scalar)
+    far = found.sigmas > max(MARGIN * FAILING, CHAOTIC * shaken.sigmas)
+    if not far and found.share <= max(MARGIN * WIDE, CHAOTIC * shaken.share) and not found.errors:
         return
     i = found.state if far else found.widest
-    bits = max(_missing(found.sigmas), math.ceil(math.log2(max(min(found.share, 1e9) / WIDE, 2.0))))
+    bits = max(_missing(found.sigmas), math.ceil(math.log2(max(min(found.share, 1e9) / (MARGIN * WIDE), 2.0))))
     what = _carrying(formats, i, real, scalar)
     raise SpecError.at(
         real.model.spec.states[i].place,
         f"{what}, everywhere in the declared ranges; {bits} bit{'s' * (bits > 1)} missing",
-        f"{_narrower(real, i, bits)}; or use covariance: sqrt, or float",
+        f"{_narrower(real, i, bits)}; or {_other(real)}",
     )  # fmt: skip
 
 
+def _saturated(found: Found, real: FilterCode, scalar: Fixed) -> None:
+    """SpecError: something has no format that holds it everywhere."""
+    function, times = found.saturated.most_common(1)[0]
+    i = found.widest if found.share > 0 else found.state
+    raise SpecError.at(
+        real.model.spec.states[i].place,
+        f"{scalar.name} cannot carry all that `{function}` computes in the declared ranges: it saturates in {times} of "
+        f"{found.rows} steps; 1 bit missing, at least",
+        f"{_narrower(real, i, 1)}; or {_other(real)}",
+    )
+
+
 def _cure(real: FilterCode, i: int, bits: int) -> str:
-    cure = "start with a smaller std, declare a range, try covariance: sqrt, or use float"
+    cure = f"start with a smaller std, declare a range, {_other(real)}"
     return cure if real.model.spec.states[i].range is None else f"{_narrower(real, i, bits)}; or {cure}"
+
+
+def _other(real: FilterCode) -> str:
+    """What else may do: a full covariance needs the fewest digits, as it divides by nothing but S."""
+    full = not any(block.name.rpartition(".")[2] in ("D", "S") for block in real.blocks)
+    return "or use float" if full else "try covariance: full, or use float"
 
 
 def _narrower(real: FilterCode, i: int, bits: int) -> str:

@@ -18,18 +18,24 @@ from kfgen.fixed.trial.integers import IntegerProgram
 from kfgen.spec.types import Sensor
 
 SHAKEN = 2.0**-11  # of a covariance: what a format of 12 bits would lose in a step
+LOOK = 4  # rows from one comparison of variances to the next
 ERRORS = ("NOT_FINITE", "NOT_POSITIVE")
 
 
 @dataclass(frozen=True)
 class Departure:
-    """The largest error of the integers: of which state, in standard deviations, and after which row."""
+    """The largest error of the integers: of which state, in standard deviations, and after which row.
+
+    widest, share: the state whose variance is off most, and by which share of it.
+    """
 
     state: int
     sigmas: float
     row: int
     errors: int  # calls that only the integers refused
     course: tuple[float, ...] = ()  # the error after each row
+    widest: int = 0
+    share: float = 0.0
 
     def beyond(self, other: Departure, least: float, factor: float) -> bool:
         """Whether an error is larger than `least`, and than `factor` times what the other has had by then."""
@@ -90,7 +96,7 @@ class Probe:
         self.call("init")
         run_time = self.spec.dt is not None and self.spec.dt.run_time
         worst = Departure(0, 0.0, 0, 0)
-        course = []
+        course, widest, share = [], 0, 0.0
         for k in range(rows):
             for each in self.spec.inputs:
                 self.give(("number", f"u.{each.name}"), f"u.{each.name}", float(log[each.name][k]))
@@ -109,8 +115,11 @@ class Probe:
             course.append(sigmas)
             if not sigmas <= worst.sigmas:
                 worst = Departure(state, sigmas, k, 0)
+            if k % LOOK == 0:
+                for i, off in enumerate(self.shares()):
+                    widest, share = (widest, share) if off <= share else (i, off)
         self._others()
-        return replace(worst, errors=self.refused, course=tuple(course))
+        return replace(worst, errors=self.refused, course=tuple(course), widest=widest, share=share)
 
     def between(self) -> None:
         """What is done after each row."""
@@ -137,8 +146,29 @@ class Probe:
             if not f.name.startswith("update_") or f.name.endswith("_masked"):
                 self.integer.run(f.name, other)
 
-    def error(self) -> tuple[int, float]:
-        """The largest error of a state, in standard deviations, and of which."""
+    def shares(self, least: Sequence[float] = ()) -> list[float]:
+        """By which share of itself each variance (n) is off, less its LSB; 0 where it is no more than `least`."""
+        n = len(self.code.model.errors)
+        if "get_covariance" not in self.names:
+            return [0.0] * n
+        other = self.b.copy()
+        self.integer.run("get_covariance", other)
+        out = []
+        for i, wanted in enumerate(self.real.variances(self.a, n)):
+            e = self.formats.fixed[self.formats.arrays.variance(i, n)]
+            off = abs(self.variance(other.arrays["P"][i * n + i], e) - wanted) - math.ldexp(1.0, e)
+            out.append(off / wanted if wanted > (least[i] if least else 0.0) else 0.0)
+        return out
+
+    def variance(self, value: float, e: int) -> float:
+        """A variance as b has it, its LSB 2^e."""
+        return math.ldexp(value, e)
+
+    def error(self, vanished: float = 0.0) -> tuple[int, float]:
+        """The largest error of a state, in standard deviations, and of which.
+
+        vanished: the share of its first variance below which a state is not looked at.
+        """
         space = self.code.model.space
         n = space.dimension
         variances = [math.inf] * n
@@ -152,7 +182,9 @@ class Probe:
                 continue
             error = max(0.0, abs(apart[j]) - math.ldexp(4.0, self._lsb(i)))
             sigma = math.sqrt(max(variances[j], 0.0))
-            ratio = error / sigma if sigma > 1e-9 * (1e-300 + abs(self.a.arrays["kf.x"][i])) else 0.0
+            least = 1e-9 * (1e-300 + abs(self.a.arrays["kf.x"][i]))
+            known = sigma > least and variances[j] > vanished * float(self.code.model.P0[j][j])
+            ratio = error / sigma if known else 0.0
             if not ratio <= worst[1]:
                 worst = (i, ratio)
         return worst
@@ -169,6 +201,9 @@ class Shaking(Probe):
 
     def value(self, i: int) -> float:
         return float(self.b.arrays["kf.x"][i])
+
+    def variance(self, value: float, e: int) -> float:
+        return value
 
     def between(self) -> None:
         x = self.b.arrays["kf.x"]
