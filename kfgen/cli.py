@@ -19,6 +19,7 @@ from kfgen.commands.cost import cost
 from kfgen.commands.language import language
 from kfgen.commands.run import run
 from kfgen.commands.simulate import simulate
+from kfgen.commands.smooth import smooth
 from kfgen.errors import KfgenError
 
 # matrices here are small: a pool of threads only makes them wait for each other
@@ -78,7 +79,7 @@ def cli() -> None:
     """Turn Kalman-filter specs in YAML into specialised C."""
 
 
-for command in (build, check, run, simulate, cost, language):
+for command in (build, check, run, smooth, simulate, cost, language):
     cli.add_command(command)
 
 

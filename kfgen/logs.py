@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 import re
+import sys
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from itertools import islice
@@ -25,6 +28,7 @@ Array = NDArray[np.float64]
 # decimal numbers and NaN; float() would also take `1_000`, other scripts' digits and `infinity`
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan|inf)", re.ASCII | re.IGNORECASE)
 _CHUNK = 1 << 14  # rows that are turned into text at a time
+STANDARD_INPUT = "-"
 _FEW = 1000  # names among which a misspelt one is looked for
 _RATE, _GAP, _GAPS = 0.05, 1.5, 0.01  # of dt: by how much the usual step may differ, what is a gap; how many may be
 _ODD = re.compile(r"[^0-9eE.+\-naNA]")
@@ -45,6 +49,15 @@ class Log:
 
 
 Source = Log | Mapping[str, ArrayLike] | str | os.PathLike[str]
+
+
+def held(column: Array, name: str, source: str) -> Array:
+    """An input's column whose empty cells take the last value before them; KfgenError where the first is empty."""
+    there = ~np.isnan(column)
+    if column.size and not there[0]:
+        raise KfgenError(f"{source}: input `{name}` is empty in the first row; there is no value to keep")
+    last = np.maximum.accumulate(np.where(there, np.arange(column.size), 0))
+    return column[last]
 
 
 def needed_columns(spec: Spec, known: Collection[str] | None = None) -> list[str]:
@@ -88,7 +101,7 @@ def read(path: str | os.PathLike[str], spec: Spec) -> Log:
     that is no number, a row of another length, a file that is no CSV or holds no rows; OSError if it cannot
     be read.
     """
-    source = os.fspath(path)
+    source = "standard input" if os.fspath(path) == STANDARD_INPUT else os.fspath(path)
     header, rows, lines = _cells(Path(path), source)
     needed = needed_columns(spec)
     _require(header, needed, source)
@@ -102,11 +115,23 @@ def read(path: str | os.PathLike[str], spec: Spec) -> Log:
     return Log(columns, len(rows), source, ignored)
 
 
+@contextmanager
+def _opened(path: Path) -> Iterator[IO[str]]:
+    """A file as text; `-` is standard input."""
+    if str(path) != STANDARD_INPUT:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            yield stream
+    elif sys.stdin is None:
+        raise KfgenError("the log is `-`, but there is no standard input")
+    else:
+        yield io.TextIOWrapper(io.BytesIO(sys.stdin.buffer.read()), encoding="utf-8-sig", newline="")
+
+
 def _cells(path: Path, source: str) -> tuple[list[str], list[list[str]], list[int]]:
     rows: list[list[str]] = []
     lines: list[int] = []
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
+        with _opened(path) as stream:
             reader = csv.reader(stream, strict=True)
             header = [name.strip() for name in next(reader, [])]
             if not any(header):

@@ -38,6 +38,24 @@ def read_ranges(path: Path | None, spec: Spec) -> Log | None:
     return read(path, spec)
 
 
+any_rate_option = click.option(
+    "--any-rate", is_flag=True, help="With a fixed dt: take a log whose steps are others all the same."
+)
+
+
+def log_of(path: Path, spec: Spec, any_rate: bool) -> Log:
+    """The log of a file (`-`: of standard input), whose rate has to fit a fixed dt; it tells of ignored columns."""
+    from kfgen import logs
+    from kfgen.native.run import fixed_step
+
+    data = logs.read(path, spec)
+    if data.ignored:
+        click.echo(f"kfgen: ignored columns of {data.source}: {logs.listed(data.ignored)}", err=True)
+    if fixed_step(spec) and not any_rate:
+        logs.check_rate(data, fixed_step(spec))
+    return data
+
+
 quiet_option = click.option("--quiet", is_flag=True, help="No advice on what a spec may not mean.")
 
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.errors import KfgenError
-from kfgen.logs import Log, Source, as_log
+from kfgen.logs import Log, Source, as_log, held
 from kfgen.native.struct import Struct
 from kfgen.native.values import Array
 from kfgen.spec.constants import value
@@ -98,7 +97,7 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
             step[1:] = np.diff(t) != 0
     u = np.empty((rows, len(spec.inputs)))
     for i, each in enumerate(spec.inputs):
-        u[:, i] = _held(columns[each.name], each.name, log.source)
+        u[:, i] = held(columns[each.name], each.name, log.source)
     mask = np.zeros((rows, len(spec.measurements)), dtype=np.uint32)
     values: list[Array] = []
     absent = np.full(rows, np.nan)
@@ -110,15 +109,6 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
         mask[:, i] = bits if sensor.partial else np.where(bits == full, full, 0)
         values.append(np.where(np.isnan(z), 0.0, z))
     return Plan(t, step.astype(np.uint8), difference, u, mask, np.hstack(values) if values else np.empty((rows, 0)))
-
-
-def _held(column: Array, name: str, source: str) -> Array:
-    """Empty cells take the last value before them."""
-    there = ~np.isnan(column)
-    if column.size and not there[0]:
-        raise KfgenError(f"{source}: input `{name}` is empty in the first row; there is no value to keep")
-    last = np.maximum.accumulate(np.where(there, np.arange(column.size), 0))
-    return column[last]
 
 
 def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int], None] | None = None) -> RunResult:

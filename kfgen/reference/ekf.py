@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kfgen.reference.adapt import Adapted
-from kfgen.reference.algorithm import Algorithm, Correction, Estimate, Innovation
+from kfgen.reference.algorithm import Algorithm, Correction, Estimate, Innovation, Passage
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.joseph import Update, update
 from kfgen.reference.linalg import symmetric
@@ -57,7 +57,7 @@ class Ekf(Algorithm):
         F = transition.F
         P = symmetric(F @ estimate.P @ F.T + transition.Q)
         x, P, flags = self.limits.finish(transition.x, P, context)
-        return replace(estimate, x=x, P=P, memory=None), flags
+        return replace(estimate, x=x, P=P, memory=None, passage=Passage(x, P, estimate.P @ F.T)), flags
 
     def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
         """y = z - h(x), S = H P H^T + R + M Re M^T; nis = y^T S^-1 y."""

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kfgen.reference.algorithm import Correction, Estimator
+from kfgen.reference.algorithm import Correction, Estimate, Estimator
 from kfgen.reference.clock import Clock, step_of
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.linalg import lower_root, udu
@@ -27,7 +27,7 @@ class ReferenceFilter:
     """One filter, in float64 and physical units.
 
     Attributes (arrays are copies):
-        x (n), P (n, n): the estimate, in the spec's order of the states.
+        x (n), P (n, n): the estimate, in the spec's order of the states; estimate: with what else is kept of it.
         nis: normalised innovation squared of the last update, also of a gated one; 0 after init.
         log_likelihood: of the last update that was made.
         t: seconds since init.
@@ -56,6 +56,10 @@ class ReferenceFilter:
     @property
     def P(self) -> Matrix:
         return self._estimate.P.copy()
+
+    @property
+    def estimate(self) -> Estimate:
+        return self._estimate
 
     @property
     def sqrt_covariance(self) -> Matrix:
@@ -218,7 +222,7 @@ class ReferenceFilter:
         except np.linalg.LinAlgError:  # numbers near the end of their range
             return int(Status.NOT_FINITE)
 
-    def run(self, log: Mapping[str, Sequence[float]]) -> Run:
+    def run(self, log: Mapping[str, ArrayLike]) -> Run:
         """Replays a log from the filter's present state: see kfgen.reference.log.replay."""
         return replay(self, log)
 

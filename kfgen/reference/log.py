@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.replayed import Replayed
@@ -30,8 +30,8 @@ class Run:
     mu: Matrix | None = None
 
 
-def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
-    """Per row: predict, then the updates in the spec's order.
+def replay(kf: Replayed, log: Mapping[str, ArrayLike], seen: Callable[[int], None] = lambda row: None) -> Run:
+    """Per row: predict, then the updates in the spec's order; then `seen` is called with the row.
 
     The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`) to values, NaN where there is no
     measurement. Run-time dt: t minus the last row's t, no predict in the first row and for equal t; fixed dt:
@@ -80,6 +80,7 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
         result.x[row], result.var[row] = kf.x, kf.P.diagonal()
         if result.mu is not None:
             result.mu[row] = kf.mu
+        seen(row)
     return result
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, block_diag, solve_discrete_are
 
 from kfgen.errors import SpecError
-from kfgen.reference.algorithm import Correction, Estimate, Innovation
+from kfgen.reference.algorithm import Correction, Estimate, Innovation, Passage
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.ekf import Ekf
 from kfgen.reference.joseph import Update, update
@@ -72,7 +72,11 @@ class Steady(Ekf):
 
     def predict(self, estimate: Estimate, context: Context) -> tuple[Estimate, Status]:
         """x <- f(x, u)."""
-        return replace(estimate, x=self._finish(self.process.linearise(estimate.x, context).x)), Status.OK
+        transition = self.process.linearise(estimate.x, context)
+        x = self._finish(transition.x)
+        before_first = next(iter(self._turns.values())).P
+        passage = Passage(x, before_first, self._after @ transition.F.T)
+        return replace(estimate, x=x, passage=passage), Status.OK
 
     def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
         """y = z - h(x); nis by the constant S."""

@@ -47,6 +47,7 @@ ALLOWED = {
     # the compiled filter, and what uses it
     "simulate": SPEC | {"geometry", "logs", "reference"},
     "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
+    "smoothing": SPEC | {"logs", "native", "reference"},
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC
     | {"advice", "generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
@@ -57,7 +58,7 @@ ALLOWED = {
     "layouts": {"emit"},
     "commands": SPEC
     | {"advice", "check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference"}
-    | {"seal", "selftest", "simulate", "status"},
+    | {"seal", "selftest", "simulate", "smoothing", "status"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "status"},
     "__main__": {"cli"},
