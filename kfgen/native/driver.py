@@ -48,6 +48,7 @@ def source(spec: Spec, declared: Declarations) -> str:
         covariance=declared.has("get_covariance"),
         modes=len(spec.imm.modes) if spec.imm else 0,
         compensated=spec.code.compensated,
+        likelihood=spec.code.log_likelihood,
     )
 
 
@@ -55,8 +56,8 @@ def _signature(name: str) -> str:
     real = f"{name}_real_t"
     return (
         f"void {name}_kfgen_run({name}_t *kf, size_t rows, const uint8_t *step, const {real} *dt, "
-        f"const {real} *u, const uint32_t *mask, const {real} *z, {real} *x, {real} *rest, {real} *var, {real} *nis, "
-        f"{real} *mu, uint32_t *status)"
+        f"const {real} *u, const uint32_t *mask, const {real} *z, {real} *x, {real} *rest, {real} *var, "
+        f"{real} *cov, {real} *nis, {real} *ll, {real} *mu, uint32_t *status)"
     )
 
 

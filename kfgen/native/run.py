@@ -27,7 +27,8 @@ class RunResult:
     t: [N] s, of the log, or step * dt. x: [N, n]. var: [N, n], the covariance's diagonal. nis: sensor -> [N],
     NaN where that sensor was not updated or its update failed. status: [N] uint32, the bits of all calls of
     the row. calls: function -> [N] uint32, its own status (0 where it was not called). mu: [N, modes] for an
-    imm, else None.
+    imm, else None. P: [N, n, n], the whole covariance, where it was asked for. log_likelihood: sensor -> [N], NaN as in
+    nis and where the update was gated, where the spec keeps it.
     """
 
     t: Array
@@ -37,6 +38,8 @@ class RunResult:
     status: NDArray[np.uint32]
     calls: Mapping[str, NDArray[np.uint32]]
     mu: Array | None = None
+    P: Array | None = None
+    log_likelihood: Mapping[str, Array] | None = None
 
     def counts(self, errors: bool = True) -> dict[str, dict[Status, int]]:
         """How often each function returned each error (or warning) bit; functions without are left out."""
@@ -48,7 +51,6 @@ class RunResult:
             if number:
                 found[function] = number
         return found
-
 
     @property
     def failed(self) -> bool:
@@ -117,9 +119,18 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
     See `plan` for what is done in a row. The filter's errors are in the result, none is raised. `progress` is
     called with (rows done, rows) now and then. KfgenError for a log that does not fit the spec.
     """
-    log = as_log(source, spec)
-    work = plan(spec, log, fixed_step(spec))
-    rows, n, sensors = log.rows, len(spec.states), len(spec.measurements)
+    return follow(struct, spec, plan(spec, as_log(source, spec), fixed_step(spec)), progress)
+
+
+def follow(
+    struct: Struct,
+    spec: Spec,
+    work: Plan,
+    progress: Callable[[int, int], None] | None = None,
+    whole: bool = False,
+) -> RunResult:
+    """The same of calls that are planned already. whole: with the covariance of each row."""
+    rows, n, sensors = len(work.t), len(spec.states), len(spec.measurements)
     modes = len(spec.imm.modes) if spec.imm else 0
     scalar, units = struct.value, struct.units
 
@@ -132,7 +143,9 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         "x": np.zeros((rows, n), scalar.dtype),
         "rest": np.zeros((rows, len(struct.compensated)), scalar.dtype),
         "var": np.zeros((rows, n), scalar.dtype),
+        "cov": np.zeros((rows if whole else 0, n * n), scalar.dtype),
         "nis": np.zeros((rows, sensors), scalar.dtype),
+        "ll": np.zeros((rows, sensors), scalar.dtype),
         "mu": np.zeros((rows, modes), scalar.dtype),
         "status": np.zeros((rows, sensors + 1), np.uint32),
     }
@@ -143,6 +156,8 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
     nis = scalar.to_physical(arrays["nis"], units.one)
     status: NDArray[np.uint32] = arrays["status"]
     updated = (arrays["mask"] != 0) & (status[:, 1:] < ERROR)
+    accepted = updated & (status[:, 1:] & Status.GATED.value == 0)
+    ll = scalar.to_physical(arrays["ll"], units.one)
     functions = ["predict", *(f"update_{name}" for name in units.z)]
     x = scalar.to_physical(arrays["x"], units.x)
     x[:, list(struct.compensated)] += arrays["rest"].astype(np.float64)
@@ -156,6 +171,10 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         status=np.bitwise_or.reduce(status, axis=1),
         calls={function: status[:, i] for i, function in enumerate(functions)},
         mu=scalar.to_physical(arrays["mu"], units.one) if modes else None,
+        P=scalar.to_physical(arrays["cov"].reshape(rows, n, n), units.P) if whole else None,
+        log_likelihood={name: np.where(accepted[:, i], ll[:, i], np.nan) for i, name in enumerate(units.z)}
+        if spec.code.log_likelihood
+        else None,
     )
 
 

@@ -261,8 +261,7 @@ class ReferenceFilter:
         rule = self.spec.initialize
         if rule is None or not self._uninitialised or rule.sensor != reading.sensor.name:
             return False
-        components = reading.sensor.components
-        return all(components.index(component) in reading.used for component in rule.states.values())
+        return all(reading.sensor.components.index(each) in reading.used for each in rule.states.values())
 
     def _initialise(self, reading: Reading) -> Status:
         """Sets the states that the spec names from the reading; the covariance stays, no update is made."""
