@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from kfgen.native import compile_many as compile_many
     from kfgen.reference import reference as reference
     from kfgen.spec import load as load
+    from kfgen.tuning import tune as tune
 
 __version__ = "0.1.0"
 
@@ -41,9 +42,10 @@ __all__ = [
     "generate",
     "load",
     "reference",
+    "tune",
 ]
 
-_FUNCTIONS = {"load": "kfgen.spec", "compile": "kfgen.native", "compile_many": "kfgen.native"}
+_FUNCTIONS = {"load": "kfgen.spec", "compile": "kfgen.native", "compile_many": "kfgen.native", "tune": "kfgen.tuning"}
 _CALLABLE_MODULES = ("generate", "reference")
 
 

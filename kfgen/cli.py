@@ -20,6 +20,7 @@ from kfgen.commands.language import language
 from kfgen.commands.run import run
 from kfgen.commands.simulate import simulate
 from kfgen.commands.smooth import smooth
+from kfgen.commands.tune import tune
 from kfgen.errors import KfgenError
 
 # matrices here are small: a pool of threads only makes them wait for each other
@@ -79,7 +80,7 @@ def cli() -> None:
     """Turn Kalman-filter specs in YAML into specialised C."""
 
 
-for command in (build, check, run, smooth, simulate, cost, language):
+for command in (build, check, run, tune, smooth, simulate, cost, language):
     cli.add_command(command)
 
 

@@ -48,6 +48,8 @@ ALLOWED = {
     "simulate": SPEC | {"geometry", "logs", "reference"},
     "native": SPEC | {"emit", "files", "generate", "logs", "override", "status"},
     "smoothing": SPEC | {"logs", "native", "reference"},
+    "statistics": set(),
+    "tuning": SPEC | {"geometry", "logs", "native", "reference", "statistics", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "check": SPEC
     | {"advice", "generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
@@ -58,9 +60,9 @@ ALLOWED = {
     "layouts": {"emit"},
     "commands": SPEC
     | {"advice", "check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference"}
-    | {"seal", "selftest", "simulate", "smoothing", "status"},
+    | {"seal", "selftest", "simulate", "smoothing", "status", "tuning"},
     "cli": {"commands", "errors"},
-    "__init__": SPEC | {"generate", "native", "reference", "status"},
+    "__init__": SPEC | {"generate", "native", "reference", "status", "tuning"},
     "__main__": {"cli"},
 }
 """Part of kfgen -> the other parts it may import; `kfgen` itself (its version, a lazy name) is looked through."""
@@ -70,6 +72,7 @@ FLOORS = {
                 "build"],
     "filters.covariance": ["names", "noise", "kept", "parts", "base", "motion", "definite", "kernels", "gather",
                            "loops", "straight", "forms", "ud", "full", "sqrt"],
+    "tuning": ["numbers", "writing", "objective", "search"],
     "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "build"],
 }  # fmt: skip
 """Part or room -> its files and rooms, the lowest first: each imports only what stands before it."""
