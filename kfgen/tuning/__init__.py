@@ -17,7 +17,7 @@ from kfgen.logs import Source, as_log
 from kfgen.spec.types import Spec
 from kfgen.tuning.numbers import Slot, default_slots, opened, slot_of, written
 from kfgen.tuning.objective import Objective, Score
-from kfgen.tuning.search import Advance, Coordinates, Curvature, Search, curvature, units_of, upper
+from kfgen.tuning.search import Advance, Coordinates, Curvature, Search, curvature, units_of
 from kfgen.tuning.writing import rounded, with_numbers
 
 OBJECTIVES = ("likelihood", "rmse")
@@ -127,10 +127,11 @@ def tuned(
         raise KfgenError(
             f"{listed} cannot all be tuned, since code is generated for the number itself:\n{error}"
         ) from None
-    return _searched(spec, slots, judge, holdout, advance)
+    return searched(spec, slots, judge, advance)
 
 
-def _searched(spec: Spec, slots: list[Slot], judge: Objective, holdout: float, advance: Advance) -> Tuned:
+def searched(spec: Spec, slots: Sequence[Slot], judge: Objective, advance: Advance = lambda done, what: None) -> Tuned:
+    """The best values of slots by an objective made for them."""
     start = [slot.value for slot in slots]
     before = judge.scores([start])[0]
     search = Search(judge, Coordinates(slots, units_of(judge, slots)), advance)
@@ -140,19 +141,16 @@ def _searched(spec: Spec, slots: list[Slot], judge: Objective, holdout: float, a
     if not search.interrupted and judge.kind == "likelihood":
         try:
             found = curvature(search)
-            values = search.coordinates.numbers(search.best)
-            for i in found.loose:
-                values[i] = _left(search, slots[i], i, values[i])
+            for i, highest in found.loose.items():
+                # what the data leave open stays what it was where that fits; else as large as fits, not as small
+                values[i] = min(slots[i].value, highest) if slots[i].positive else values[i]
         except KeyboardInterrupt:
             search.interrupted = True
     values = [rounded(number) for number in values]
     after = judge.scores([values])[0]
-    return Tuned(spec, tuple(slots), tuple(values), before, after, found, holdout, search.interrupted, judge.trials)
-
-
-def _left(search: Search, slot: Slot, i: int, value: float) -> float:
-    """A number that the data leaves open stays what it was where that fits; else as large as fits, not as small."""
-    return min(slot.value, upper(search, i)) if slot.positive else value
+    return Tuned(
+        spec, tuple(slots), tuple(values), before, after, found, judge.holdout, search.interrupted, judge.trials
+    )
 
 
 def tune(

@@ -79,6 +79,8 @@ def slot_of(spec: Spec, asked: str, known: Mapping[str, Expression] | None = Non
         path = ending[0]
     expression = known[path]
     top = path.partition(".")[0]
+    if top in ("dt", "fixed", "code", "imm") and not path.startswith("imm.modes."):
+        raise KfgenError(f"{asked} cannot be tuned: code is generated for the number itself")
     literal = None if top in ("parameters", "constants") else _literal(asked, expression)
     number = _number(spec, expression, literal)
     noise = _is_noise(spec, path)

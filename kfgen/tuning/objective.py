@@ -22,9 +22,9 @@ from kfgen.logs import Log
 from kfgen.native.run import Plan, RunResult, fixed_step, follow, plan
 from kfgen.scalar_names import DOUBLE
 from kfgen.spec.constants import value
-from kfgen.spec.types import Spec
+from kfgen.spec.types import Sensor, Spec
 from kfgen.statistics import chi2_quantile
-from kfgen.status import ERROR
+from kfgen.status import ERROR, Status
 from kfgen.tuning.numbers import Opened, with_values
 
 if TYPE_CHECKING:
@@ -66,11 +66,11 @@ class Objective:
         self.kind, self.robust = kind, robust
         self.kf: NativeFilter = compiled(self.spec)
         self.drives = [_drive(self.spec, log, holdout) for log in logs]
+        self.holdout = holdout
         periods = [None if s.period is None else float(value(s.period.tree, self.spec)) for s in self.spec.states]
         self.parts = [part_of(period) for period in periods]
-        self.limits = {
-            m: chi2_quantile(OUTLIER, m) for m in range(1, 1 + max(d.used.max(initial=1) for d in self.drives))
-        }
+        widest = max(len(sensor.components) for sensor in self.spec.measurements)
+        self.limits = {m: chi2_quantile(OUTLIER, m) for m in range(1, 1 + widest)}
         self.pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
         self.trials = 0
         if kind == "rmse" and not any(np.isfinite(drive.truth).any() for drive in self.drives):
@@ -82,6 +82,33 @@ class Objective:
         self.trials += len(wanted)
         jobs = [[self.pool.submit(self._one, numbers, drive) for drive in self.drives] for numbers in wanted]
         return [self._sum([job.result() for job in row]) for row in jobs]
+
+    def over(self, logs: Sequence[Log]) -> Objective:
+        """The same of other logs: nothing is compiled again."""
+        other = object.__new__(Objective)
+        other.__dict__.update(self.__dict__)
+        other.drives, other.trials = [_drive(self.spec, log, self.holdout) for log in logs], 0
+        return other
+
+    def decided(self, trial: Sequence[float]) -> Objective:
+        """The same with what the gates decide at a trial decided for good: what they reject there is not measured, all
+        else is let in. It is smooth, and there it is as high as this one but for what the rejected ones count."""
+        if not any(sensor.gate is not None for sensor in self.spec.measurements):
+            return self
+        numbers = dict(zip(self.opened.names, map(float, trial), strict=True))
+        drives = []
+        for drive in self.drives:
+            result = self._one(numbers, drive)[0]
+            gated = (
+                np.column_stack([result.calls[f"update_{s.name}"] & Status.GATED for s in self.spec.measurements]) != 0
+            )
+            work = replace(drive.work, mask=np.where(gated, 0, drive.work.mask).astype(np.uint32))
+            drives.append(replace(drive, work=work, used=np.where(gated, 0, drive.used)))
+        other = Objective(
+            replace(self.opened, spec=_ungated(self.opened.spec)), [], self.holdout, "likelihood", self.robust
+        )
+        other.drives = drives
+        return other
 
     def value(self, score: Score) -> float:
         """What is to become as large as it can."""
@@ -130,9 +157,10 @@ class Objective:
         """What each row [N] of a sensor adds to the log-likelihood.
 
         A gated innovation is no term of its filter: were it left out, a filter that gates all would be the best. It
-        counts with the determinant of the last innovation that was taken, and beyond the quantile of `OUTLIER` (with
-        `robust` any innovation) with c (1 + ln(nis/c)) in place of its nis, the tail of a power law: an outlier,
-        however far, then pulls no more than one at the limit.
+        counts with the determinant of the last innovation that was taken. Beyond the quantile of `OUTLIER`, c, a gated
+        one (with `robust` any) counts with c + (m + 1) ln(nis/c) in place of its nis, as in a Cauchy distribution's
+        tail: an outlier pulls as two or three good measurements do, however far it is, and no filter gains by making
+        all of them outliers.
         """
         name = self.spec.measurements[i].name
         assert result.log_likelihood is not None
@@ -146,7 +174,7 @@ class Objective:
             return terms
         limit = np.array([self.limits.get(int(k), math.inf) for k in m])
         with np.errstate(divide="ignore", invalid="ignore"):
-            bent = np.where(nis > limit, limit * (1.0 + np.log(nis / limit)), nis)
+            bent = np.where(nis > limit, limit + (m + 1) * np.log(nis / limit), nis)
             rest = np.where(taken, -2.0 * ll - nis, np.nan)  # m ln 2 pi + ln |S|
         if not taken.any():
             terms[gated] = FAILED
@@ -175,6 +203,18 @@ def _bare(spec: Spec) -> Spec:
     """What is compiled: in double, keeping its likelihood, of no budget."""
     code = replace(spec.code, log_likelihood=True, compensated=(), flash=None, ram=None, stack=None)
     return replace(spec, scalar=DOUBLE, code=code)
+
+
+def _ungated(spec: Spec) -> Spec:
+    """A spec whose sensors have no gates, in any mode."""
+
+    def open_(sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
+        return tuple(replace(sensor, gate=None) for sensor in sensors)
+
+    imm = spec.imm
+    if imm is not None:
+        imm = replace(imm, modes=tuple(replace(mode, measurements=open_(mode.measurements)) for mode in imm.modes))
+    return replace(spec, measurements=open_(spec.measurements), imm=imm)
 
 
 def _drive(spec: Spec, log: Log, holdout: float) -> _Drive:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,10 +16,10 @@ from kfgen.tuning.numbers import Slot
 from kfgen.tuning.objective import Array, Objective, Score
 
 FAR = math.log(1e6)  # how far a positive number may go from where it was, in its logarithm
-STEP = 2e-3  # of the gradient's differences, in the coordinates
+STEP, ROUGH_STEP = 2e-3, 0.03  # of the gradient's differences, in the coordinates; where gates make jumps
 LOOSE = math.log(10.0)  # a standard error of a logarithm beyond this tells nothing
 FLAT = 2e-3  # an eigenvalue of the normalised curvature below this is none
-CLEAR, GATED = 0.02, 0.5  # what a difference of the curvature changes the likelihood by; where a gate makes it jump
+CLEAR = 0.02  # what a difference of the curvature changes the likelihood by
 
 Advance = Callable[[int, str], None]
 
@@ -67,6 +67,11 @@ class Search:
     height: float = -math.inf
     interrupted: bool = False
 
+    @property
+    def uneven(self) -> bool:
+        """Whether a small change may make a jump."""
+        return any(sensor.gate is not None for sensor in self.objective.spec.measurements)
+
     def heights(self, trials: Sequence[Array]) -> Array:
         scores = self.objective.scores([self.coordinates.numbers(trial) for trial in trials])
         heights = np.array([self.objective.value(score) for score in scores])
@@ -81,16 +86,15 @@ class Search:
         """To the top, by L-BFGS-B on differences; then by a simplex where gates make the ground uneven."""
         k = len(self.coordinates.slots)
         bounds = self.coordinates.bounds()
-        uneven = any(sensor.gate is not None for sensor in self.objective.spec.measurements)
         try:
-            self.heights([np.zeros(k)])
+            self.heights([self.best if self.best.size else np.zeros(k)])
             for _ in range(4):
                 before = self.height
                 minimize(self._slope, self.best, jac=True, method="L-BFGS-B", bounds=bounds,
                          options={"maxiter": 100, "ftol": 1e-10, "gtol": 1e-3, "maxls": 30})  # fmt: skip
                 if self.height - before < 0.01:
                     break
-            if uneven and k <= 8:
+            if self.uneven and k <= 8:
                 simplex = np.vstack([self.best, self.best + 0.2 * np.eye(k)])
                 options: Any = {"initial_simplex": simplex, "maxfev": 60 * k, "fatol": 0.01, "xatol": 1e-3}
                 minimize(self._depth, self.best, method="Nelder-Mead", bounds=bounds, options=options)
@@ -101,10 +105,10 @@ class Search:
         return -float(self.heights([at])[0])
 
     def _slope(self, at: Array) -> tuple[float, Array]:
-        k = len(at)
-        moved = [at + sign * STEP * row for row in np.eye(k) for sign in (1.0, -1.0)]
+        step = ROUGH_STEP if self.uneven else STEP
+        moved = [at + sign * step * row for row in np.eye(len(at)) for sign in (1.0, -1.0)]
         heights = self.heights([at, *moved])
-        slope = (heights[1::2] - heights[2::2]) / (2 * STEP)
+        slope = (heights[1::2] - heights[2::2]) / (2 * step)
         return -float(heights[0]), -slope
 
 
@@ -150,31 +154,44 @@ class Curvature:
     """What the second derivatives at the top tell.
 
     errors [k]: standard errors of the numbers, NaN where the data cannot tell them. correlations [k, k]: of the
-    coordinates, NaN likewise. unidentified: sentences. loose: the slots that stay open by themselves.
+    coordinates, NaN likewise. unidentified: sentences. loose: the slots that stay open by themselves, and how large
+    they may be before the likelihood falls by 1/2.
     """
 
     errors: Array
     correlations: Array
     unidentified: tuple[str, ...]
-    loose: tuple[int, ...]
+    loose: Mapping[int, float]
 
 
-def curvature(search: Search) -> Curvature:
-    """By central differences, wide enough for the likelihood's change to be seen, small enough for it to be even."""
+def curvature(found: Search) -> Curvature:
+    """By central differences, wide enough for the likelihood's change to be seen, small enough for it to be even.
+
+    What the gates have decided at the top stays decided (at their thresholds the likelihood jumps): the curvature is
+    that at the top of the likelihood of what they let in.
+    """
+    still = found.objective.decided(found.coordinates.numbers(found.best))
+    search = Search(still, found.coordinates, lambda done, what: found.advance(found.objective.trials + done, what))
+    search.best = found.best
+    if still is not found.objective:
+        search.climb()
+        if search.interrupted:
+            raise KeyboardInterrupt
+    result = _curvature(search)
+    found.objective.trials += still.trials if still is not found.objective else 0
+    return result
+
+
+def _curvature(search: Search) -> Curvature:
     slots, k = search.coordinates.slots, len(search.best)
-    uneven = any(sensor.gate is not None for sensor in search.objective.spec.measurements)
-    wanted = GATED if uneven else CLEAR
-    for _ in range(5):
-        top, height = search.best, float(search.heights([search.best])[0])
-        widths, drops = _widths(search, top, height, wanted)
-        if search.height - height < 0.1 * wanted:  # else the top is elsewhere
-            break
-    open_alone = [i for i in range(k) if not drops[i] > 0.25 * wanted]
+    top, height = search.best, float(search.heights([search.best])[0])
+    widths, drops = _widths(search, top, height, CLEAR)
+    open_alone = [i for i in range(k) if not drops[i] > 0.25 * CLEAR]
     told = [f"{slots[i].path}: {_why_alone(search, i)}" for i in open_alone]
     used = [i for i in range(k) if i not in open_alone]
     errors, correlations = np.full(k, math.nan), np.full((k, k), math.nan)
     if not used:
-        return Curvature(errors, correlations, tuple(told), tuple(open_alone))
+        return Curvature(errors, correlations, tuple(told), {i: upper(search, i) for i in open_alone})
     H = _hessian(search, top, height, widths, used)
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
@@ -182,7 +199,7 @@ def curvature(search: Search) -> Curvature:
     tied: set[int] = set()
     for j in flat:
         direction = vectors[:, j] / scale
-        members = [m for m in range(len(used)) if abs(vectors[m, j]) > 0.2]
+        members = [m for m in range(len(used)) if abs(vectors[m, j]) > 0.3]
         tied |= {used[m] for m in members}
         told.append(_tie(search, top, height, used, members, direction))
     kept = [j for j in range(len(used)) if j not in flat]
@@ -196,17 +213,20 @@ def curvature(search: Search) -> Curvature:
             told.append(f"{slots[i].path}: {_why_alone(search, i)}")
             open_alone.append(i)
             continue
-        errors[i] = error * abs(slope[i])
+        # of a positive number, whose logarithm is estimated: that of the lognormal distribution
+        errors[i] = math.sqrt(math.expm1(error**2) * math.exp(error**2) if slots[i].positive else error**2) * abs(
+            slope[i]
+        )
         for b, other in enumerate(used):
             if other not in tied:
                 correlations[i, other] = covariance[a, b] / math.sqrt(covariance[a, a] * covariance[b, b])
-    return Curvature(errors, correlations, tuple(told), tuple(open_alone))
+    return Curvature(errors, correlations, tuple(told), {i: upper(search, i) for i in open_alone})
 
 
 def _widths(search: Search, top: Array, height: float, wanted: float) -> tuple[Array, Array]:
     """How far each coordinate has to move for the likelihood to fall by about so much, and what it then falls by.
 
-    Where it jumps, the width beyond the jump; at a positive number's end, `LOOSE`, what it falls by until there.
+    At a positive number's end, `LOOSE`, what it falls by until there.
     """
     k = len(top)
     widths = np.full(k, 0.05)
@@ -218,7 +238,7 @@ def _widths(search: Search, top: Array, height: float, wanted: float) -> tuple[A
         drops = height - search.heights(moved).reshape(k, 2).mean(axis=1)
         near = np.where(drops < 0.5 * wanted, np.maximum(near, widths), near)
         far = np.where(drops > 2.0 * wanted, np.minimum(far, widths), far)
-        settled = ((drops >= 0.5 * wanted) & (drops <= 2.0 * wanted)) | ((drops > 0) & (far < 1.3 * near))
+        settled = ((drops >= 0.5 * wanted) & (drops <= 2.0 * wanted)) | ((drops >= 0.5 * wanted) & (far < 1.3 * near))
         settled |= (near >= most) & (widths >= most)
         if settled.all():
             break
@@ -263,7 +283,8 @@ def _why_alone(search: Search, i: int) -> str:
 
 def upper(search: Search, i: int, fall: float = 0.5) -> float:
     """Up to where a positive number may grow before the likelihood falls by so much (1/2: one standard error)."""
-    top, best = search.height, search.best
+    best = search.best
+    top = float(search.heights([best])[0])
     low, high = float(best[i]), float(best[i])
     for _ in range(40):
         high += 0.5
