@@ -15,9 +15,11 @@ import numpy as np
 from kfgen.errors import KfgenError, SpecError
 from kfgen.logs import Source, as_log
 from kfgen.spec.types import Spec
-from kfgen.tuning.numbers import Slot, default_slots, opened, slot_of, written
+from kfgen.tuning.curvature import Curvature, curvature
+from kfgen.tuning.numbers import Slot, default_slots, slot_of, written
 from kfgen.tuning.objective import Objective, Score
-from kfgen.tuning.search import Advance, Coordinates, Curvature, Search, curvature, units_of
+from kfgen.tuning.opened import opened
+from kfgen.tuning.search import Advance, Coordinates, Search, units_of
 from kfgen.tuning.writing import rounded, with_numbers
 
 OBJECTIVES = ("likelihood", "rmse")

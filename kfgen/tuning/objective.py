@@ -25,7 +25,7 @@ from kfgen.spec.constants import value
 from kfgen.spec.types import Sensor, Spec
 from kfgen.statistics import chi2_quantile
 from kfgen.status import ERROR, Status
-from kfgen.tuning.numbers import Opened, with_values
+from kfgen.tuning.opened import Opened, with_values
 
 if TYPE_CHECKING:
     from kfgen.native.filter import NativeFilter

@@ -15,8 +15,9 @@ from kfgen.errors import KfgenError
 from kfgen.simulate import simulate
 from kfgen.spec import load, loads
 from kfgen.tuning import searched, tune, tuned
-from kfgen.tuning.numbers import default_slots, opened, slot_of
+from kfgen.tuning.numbers import default_slots, slot_of
 from kfgen.tuning.objective import Objective
+from kfgen.tuning.opened import opened
 from kfgen.tuning.writing import spelled
 
 TRUE = """

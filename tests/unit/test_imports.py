@@ -72,7 +72,7 @@ FLOORS = {
                 "build"],
     "filters.covariance": ["names", "noise", "kept", "parts", "base", "motion", "definite", "kernels", "gather",
                            "loops", "straight", "forms", "ud", "full", "sqrt"],
-    "tuning": ["numbers", "writing", "objective", "search"],
+    "tuning": ["numbers", "opened", "writing", "objective", "search", "curvature"],
     "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "build"],
 }  # fmt: skip
 """Part or room -> its files and rooms, the lowest first: each imports only what stands before it."""
