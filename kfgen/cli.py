@@ -17,6 +17,7 @@ from kfgen.commands.build import build
 from kfgen.commands.check import check
 from kfgen.commands.cost import cost
 from kfgen.commands.language import language
+from kfgen.commands.report import report
 from kfgen.commands.run import run
 from kfgen.commands.simulate import simulate
 from kfgen.commands.smooth import smooth
@@ -80,7 +81,7 @@ def cli() -> None:
     """Turn Kalman-filter specs in YAML into specialised C."""
 
 
-for command in (build, check, run, tune, smooth, simulate, cost, language):
+for command in (build, check, run, report, tune, smooth, simulate, cost, language):
     cli.add_command(command)
 
 

@@ -33,26 +33,33 @@ def normal_quantile(probability: float) -> float:
 class Band:
     """Normalised squares (of innovations or errors) of N vectors against the chi-square distribution.
 
-    mean: per degree of freedom, expected 1. low, high: its 95 % interval, by the standard error of the squares
-    themselves, widened by their correlation from vector to vector (Bartlett's sum over their autocorrelation). inside:
-    the share within the two-sided 95 % band of a single vector. number: N.
+    mean: per degree of freedom, expected 1. error: its standard error, by the squares themselves, widened by their
+    correlation from vector to vector. inside: the share within the two-sided 95 % band of a single vector. number: N.
     """
 
     mean: float
-    low: float
-    high: float
+    error: float
     inside: float
     number: int
 
-    def as_json(self) -> dict[str, float | int]:
-        return {"mean": self.mean, "low": self.low, "high": self.high, "inside": self.inside, "number": self.number}
+    @property
+    def reach(self) -> float:
+        """Half of the 95 % interval of the mean."""
+        return normal_quantile(0.5 + TWO_SIDED / 2) * self.error
+
+    def as_json(self) -> dict[str, float | int | list[float]]:
+        """low, high: between which the mean lies where the covariance is right. interval: of the mean."""
+        return {
+            "mean": self.mean, "low": 1.0 - self.reach, "high": 1.0 + self.reach, "inside": self.inside,
+            "interval": [self.mean - self.reach, self.mean + self.reach], "number": self.number,
+        }  # fmt: skip
 
     @property
     def verdict(self) -> str:
-        """In a word: what the interval of the mean says of the claimed covariance."""
-        if self.low > 1.0:
-            return "optimistic"
-        return "cautious" if self.high < 1.0 else "consistent"
+        """In a word: what the mean says of the claimed covariance."""
+        if abs(self.mean - 1.0) <= self.reach:
+            return "consistent"
+        return "optimistic" if self.mean > 1.0 else "cautious"
 
 
 def band(squares: Array, degrees: Array) -> Band | None:
@@ -63,12 +70,11 @@ def band(squares: Array, degrees: Array) -> Band | None:
         return None
     mean = float(q.sum() / m.sum())
     deviations = q - mean * m
-    inflation = 1.0 + 2.0 * float(np.maximum(_positive_run(autocorrelation(deviations, min(q.size - 1, 200))), 0).sum())
-    error = math.sqrt(float(deviations @ deviations) * inflation) / float(m.sum())
-    z = normal_quantile(0.5 + TWO_SIDED / 2)
+    spread = float(deviations @ deviations) if q.size > 1 else float(2.0 * m.sum())
+    inflation = 1.0 + 2.0 * float(_positive_run(autocorrelation(deviations, q.size // 4)).sum())
     low, high = limits(m)
     inside = float(np.mean((q >= low) & (q <= high)))
-    return Band(mean, mean - z * error, mean + z * error, inside, int(q.size))
+    return Band(mean, math.sqrt(spread * inflation) / float(m.sum()), inside, int(q.size))
 
 
 def limits(degrees: Array) -> tuple[Array, Array]:
@@ -101,18 +107,18 @@ def lags_of(number: int) -> int:
     return max(0, min(20, number // 5))
 
 
-def ljung_box(values: Array, lags: int | None = None) -> float | None:
-    """The p-value of the hypothesis that values [N] are white (Ljung & Box 1978); None for too few of them.
+def ljung_box(values: Array, lags: int | None = None) -> tuple[float, int] | None:
+    """Q and its degrees of freedom, of the hypothesis that values [N] are white (Ljung & Box 1978); None for too few.
 
-    Q = N (N + 2) sum r_k^2 / (N - k) over lags k is chi-square of as many degrees of freedom as there are lags.
+    Q = N (N + 2) sum r_k^2 / (N - k) over lags k is chi-square of as many degrees of freedom as there are lags; those
+    of independent series add up.
     """
     number = len(values)
     lags = lags_of(number) if lags is None else lags
     if lags < 1 or number <= lags + 1 or float(np.ptp(values)) == 0.0:
         return None
     r = autocorrelation(values, lags)
-    Q = number * (number + 2) * float(np.sum(r**2 / (number - np.arange(1, lags + 1))))
-    return chi2_tail(Q, lags)
+    return number * (number + 2) * float(np.sum(r**2 / (number - np.arange(1, lags + 1)))), lags
 
 
 def jarque_bera(values: Array) -> tuple[float, float, float] | None:

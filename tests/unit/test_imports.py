@@ -51,6 +51,9 @@ ALLOWED = {
     "statistics": set(),
     "tuning": SPEC | {"geometry", "logs", "native", "reference", "statistics", "status"},
     "plot": SPEC | {"files", "logs", "native"},
+    "report": SPEC
+    | {"cost", "generate", "geometry", "logs", "model", "native", "plot", "reference", "simulate", "smoothing"}
+    | {"statistics", "status"},
     "check": SPEC
     | {"advice", "generate", "geometry", "interface", "native", "override", "reference", "simulate", "status"},
     "cost": SPEC | {"emit", "logs", "native", "status"},
@@ -60,9 +63,9 @@ ALLOWED = {
     "layouts": {"emit"},
     "commands": SPEC
     | {"advice", "check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference"}
-    | {"seal", "selftest", "simulate", "smoothing", "status", "tuning"},
+    | {"report", "seal", "selftest", "simulate", "smoothing", "status", "tuning"},
     "cli": {"commands", "errors"},
-    "__init__": SPEC | {"generate", "native", "reference", "status", "tuning"},
+    "__init__": SPEC | {"generate", "native", "reference", "report", "status", "tuning"},
     "__main__": {"cli"},
 }
 """Part of kfgen -> the other parts it may import; `kfgen` itself (its version, a lazy name) is looked through."""
@@ -72,6 +75,7 @@ FLOORS = {
                 "build"],
     "filters.covariance": ["names", "noise", "kept", "parts", "base", "motion", "definite", "kernels", "gather",
                            "loops", "straight", "forms", "ud", "full", "sqrt"],
+    "report": ["blocks", "walk", "observability", "equations", "figures", "subject", "sections", "page"],
     "tuning": ["numbers", "opened", "writing", "objective", "search", "curvature"],
     "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "build"],
 }  # fmt: skip
