@@ -61,8 +61,8 @@ def report(
     as_json: bool,
 ) -> None:
     """Write a report that a reviewer can sign: the model with its equations, its structure and what the sensors can
-    tell, the run, the innovations (size, whiteness, normality), the errors against columns true.<state>, where each state's
-    variance comes from, costs, and the formats of fixed point.
+    tell, the run, the innovations (size, whiteness, normality), the errors against columns true.<state>, where each
+    state's variance comes from, costs, and the formats of fixed point.
 
     One HTML file: no script, nothing from elsewhere, light and dark, made to be printed. Without --log the log is
     simulated. Of a long log the first 4000 rows are linearised one by one; all of it is run.

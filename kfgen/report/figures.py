@@ -42,6 +42,7 @@ def picture(
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     settings: Any = {
         "svg.fonttype": "none", "svg.hashsalt": key, "font.size": 9, "axes.edgecolor": FAINT, "axes.labelcolor": INK,
@@ -51,13 +52,18 @@ def picture(
         "axes.xmargin": 0.01, "lines.linewidth": 1.2, "axes.formatter.useoffset": False,
     }  # fmt: skip
     with matplotlib.rc_context(settings):
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Figure(figsize=size)
         FigureCanvasSVG(figure)
         axes = figure.add_subplot()
         draw(axes)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_minor_formatter(NullFormatter())
+        # fixed margins: a layout that measures all its letters takes as long as the drawing
+        width, height = size
+        figure.subplots_adjust(left=0.85 / width, right=1 - 0.1 / width, top=1 - 0.27 / height, bottom=0.45 / height)
         handles, labels = axes.get_legend_handles_labels()
         if labels:
-            figure.legend(handles, labels, loc="outside upper right", ncols=min(len(labels), 5), borderpad=0)
+            figure.legend(handles, labels, loc="upper right", ncols=min(len(labels), 5), borderaxespad=0.1)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     return Picture(_inline(buffer.getvalue(), title, description, key), title)

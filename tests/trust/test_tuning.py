@@ -55,7 +55,7 @@ def test_finds_the_true_noises_within_three_standard_errors(judge):
     spec, slots, objective = judge
     truth, within = loads(TRUE), 0
     for seed in range(20):
-        found = searched(spec, slots, objective.over([simulate(truth, 400, seed)]))
+        found = searched(spec, slots, objective.over([simulate(truth, 250, seed)]))
         assert found.curvature is not None
         assert found.curvature.unidentified == ()
         distance = np.abs(np.subtract(found.values, RIGHT)) / found.curvature.errors

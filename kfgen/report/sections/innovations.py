@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 ORDER = 35
 WHAT = (
     "The normalised innovation squared, per degree of freedom, is 1 on average where the filter claims what is so; "
-    "above, it is too sure of itself (optimistic), below, too cautious. The interval is the 95 % one of the mean, by the "
-    "spread and the correlation of the values themselves."
+    "above, it is too sure of itself (optimistic), below, too cautious. The interval is the 95 % one of the mean, by "
+    "the spread and the correlation of the values themselves."
 )
 BANK = (
     " Of a bank it is that of the combined estimate, by the likeliest mode's sensor, in the rows that were linearised; "
