@@ -7,8 +7,25 @@ from collections import Counter
 from kfgen.ir.nodes import Node
 from kfgen.ir.program import Call, For, If, Statement, roots
 
-_FREE = {"const", "field", "element", "read", "variable", "counter", "real", "neg", "half", "finite", "bit", "lookup",
-         "q_count", "q_fit", "table_x", "table_y", "table_slope"}
+_FREE = {
+    "const",
+    "field",
+    "element",
+    "read",
+    "variable",
+    "counter",
+    "real",
+    "neg",
+    "half",
+    "finite",
+    "bit",
+    "lookup",
+    "q_count",
+    "q_fit",
+    "table_x",
+    "table_y",
+    "table_slope",
+}
 _NAMES = {"lt": "compare", "le": "compare", "q_reciprocal": "div"}
 _SILENT = {"and", "or", "not"}
 

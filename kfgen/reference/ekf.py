@@ -84,9 +84,7 @@ class Ekf(Algorithm):
         adapted = self._adapted(estimate.adapted, reading, measured.noise, x, result)
         return Correction(Estimate(x, P, adapted=adapted), result.log_likelihood, flags | result.flags)
 
-    def _adapted(
-        self, adapted: Adapted, reading: Reading, noise: Matrix | None, x: Vector, result: Update
-    ) -> Adapted:
+    def _adapted(self, adapted: Adapted, reading: Reading, noise: Matrix | None, x: Vector, result: Update) -> Adapted:
         """What an update that stores x (n) leaves of the adapted covariances."""
         if noise is not None:
             adapted = self.adaptation.with_noise(adapted, reading, noise, reading.sensor.residual(x, reading))

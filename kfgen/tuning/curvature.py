@@ -145,7 +145,10 @@ def _why_alone(search: Search, i: int) -> str:
     slot = search.coordinates.slots[i]
     if not slot.positive:
         return "the data cannot tell it"
-    return f"the data cannot tell it from 0 (below {upper(search, i, 1.92):.2g} with 95 %)"
+    highest = upper(search, i, 1.92)
+    if highest >= 0.1 * slot.value * math.exp(FAR):
+        return "the data cannot tell it"
+    return f"the data cannot tell it from 0 (below {highest:.2g} with 95 %)"
 
 
 def upper(search: Search, i: int, fall: float = 0.5) -> float:

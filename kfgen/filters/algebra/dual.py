@@ -28,9 +28,7 @@ class Dual:
     hessian: Hessian = field(default_factory=dict)
 
     def __add__(self, other: Dual) -> Dual:
-        return Dual(
-            self.value + other.value, _sum(self.gradient, other.gradient), _sum(self.hessian, other.hessian)
-        )
+        return Dual(self.value + other.value, _sum(self.gradient, other.gradient), _sum(self.hessian, other.hessian))
 
     def scaled(self, factor: Value | Number) -> Dual:
         """The product with a number that depends on no variable."""

@@ -112,7 +112,7 @@ class Seeing:
         if self.recalls and points.centre:
             middle = [t.name(t.element("middle", i), f"{name}_middle") for i, name in enumerate(model.states)]
         for i in range(self.stride):
-            point[i] = (x[i] + middle[i] if i < n else t.zero)
+            point[i] = x[i] + middle[i] if i < n else t.zero
         t.call(self.h.function, [*call, ("point", 0), ("z", 0)])
         names = [c.name for c in sensor.spec.components]
         base = [t.name(z[a], f"{name}_centre") for a, name in enumerate(names)]
@@ -192,9 +192,7 @@ class Seeing:
                 straight[place][a] = value
         return Seen([p.value for p in linear.predicted], spread, straight, [])
 
-    def draw(
-        self, u: Update, P: Any, name: str = "", stored: bool = True
-    ) -> tuple[Array, list[Value]]:
+    def draw(self, u: Update, P: Any, name: str = "", stored: bool = True) -> tuple[Array, list[Value]]:
         """An array of points of P; conditions of failure. stored: P is that of the struct."""
         array = u.t.array(f"cloud{name}", len(self.points.rows) * self.stride)
         return array, self.drawing.scatter(u.t, P, self._noise_root(u), self.points, array, stored)

@@ -30,8 +30,12 @@ class StateCode:
     """Traces the functions that do not depend on the algorithm."""
 
     def __init__(
-        self, model: Model, covariance: tuple[Block, ...], extra: tuple[Block, ...] = (),
-        outdated: tuple[str, ...] = (), states: tuple[str, ...] = ("kf.x",),
+        self,
+        model: Model,
+        covariance: tuple[Block, ...],
+        extra: tuple[Block, ...] = (),
+        outdated: tuple[str, ...] = (),
+        states: tuple[str, ...] = ("kf.x",),
         sensors: Sequence[Sequence[SensorModel]] | None = None,
     ) -> None:
         """covariance: the fields that hold it; extra: what else the algorithm keeps. states: the fields that hold x.
@@ -74,9 +78,7 @@ class StateCode:
     def confined(self, t: Trace, x: list[Value]) -> list[Value]:
         """x within its bounds, angles wrapped. Spec's order."""
         out = []
-        for value, bounds, part, name in zip(
-            x, self.model.bounds, self.model.parts, self.model.states, strict=True
-        ):
+        for value, bounds, part, name in zip(x, self.model.bounds, self.model.parts, self.model.states, strict=True):
             if bounds is not None:
                 low, high = t.value(bounds[0]), t.value(bounds[1])
                 value = t.name(value, f"{name}_free") if value.constant is None else value

@@ -49,10 +49,13 @@ def _told(subject: Subject, drive: Drive, found: Observability, without: dict[st
     blocks: list[Block] = [
         Note(
             f"Along {drive.title} (rows 1 to {drive.walk.rows}) the sensors tell {found.rank} of {n} directions of the "
-            f"state apart: {rest}. A singular value is by how many standard deviations of noise the measurements, all "
-            "together, differ for a start that is off by one of its own; process noise is left out.",
+            f"state apart: {rest}.",
             "good" if found.rank == n else "bad",
-        )
+        ),
+        Note(
+            "A singular value is by how many standard deviations of noise the measurements, all together, differ for a "
+            "start that is off by one of its own in that direction; process noise is left out."
+        ),
     ]
     rows = [
         ("all sensors", f"{found.rank} of {n}", figure(found.values[0]), figure(found.values[-1]), _direction(found))

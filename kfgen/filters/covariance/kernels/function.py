@@ -26,9 +26,7 @@ class Kernels:
         self.several = several
         self.made: dict[str, Function] = {}
 
-    def function(
-        self, name: str, arguments: list[Argument], doc: str, body: Callable[[Trace], None]
-    ) -> Function:
+    def function(self, name: str, arguments: list[Argument], doc: str, body: Callable[[Trace], None]) -> Function:
         """The function of a name; body traces it."""
         if name not in self.made:
             t = Trace(self.smallest)

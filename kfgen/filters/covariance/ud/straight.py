@@ -129,9 +129,7 @@ class StraightUD(StraightLine, UDStore):
         """None: a sum of D_j f_j^2 is not negative."""
         return 0
 
-    def limit(
-        self, t: Trace, P: Factors, floors: list[Fraction | None], ceilings: list[Fraction | None]
-    ) -> Factors:
+    def limit(self, t: Trace, P: Factors, floors: list[Fraction | None], ceilings: list[Fraction | None]) -> Factors:
         """variance_floor and variance_ceiling, on D."""
         return P[0], limited(t, P[1], floors, ceilings)
 
@@ -166,9 +164,7 @@ class StraightUD(StraightLine, UDStore):
     def root(self, t: Trace, P: Factors, tolerance: Fraction, stored: bool, in_loops: bool) -> Array | Columns:
         return self.root_array(t) if stored and in_loops else Columns(columns_of(root_of_factors(*P)), [])
 
-    def gatherer(
-        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
-    ) -> Gatherer[Factors]:
+    def gatherer(self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering) -> Gatherer[Factors]:
         def finish(U: Rows, D: Vector) -> Factors:
             return self.from_factors(t, U, D)
 
