@@ -9,6 +9,7 @@ import click
 
 from kfgen.commands.options import (
     any_rate_option,
+    columns_option,
     example,
     keep_apart,
     load_spec,
@@ -44,6 +45,7 @@ from kfgen.errors import KfgenError
 @click.option("--no-run", is_flag=True, help="Only what the spec and its code tell; takes no compiler.")
 @click.option("-o", "out", type=click.Path(path_type=Path), metavar="REPORT.html", help="Where the page goes.")
 @any_rate_option
+@columns_option
 @scalar_option
 @ranges_option
 @click.option("--json", "as_json", is_flag=True, help="Print the page's figures as JSON.")
@@ -56,6 +58,7 @@ def report(
     no_run: bool,
     out: Path | None,
     any_rate: bool,
+    renamed: Path | None,
     scalar: str | None,
     ranges: Path | None,
     as_json: bool,
@@ -78,7 +81,7 @@ def report(
         raise KfgenError("--no-run has no use for a log")
     keep_apart({"the spec": spec, **{f"the log {log}": log for log in logs}}, {"-o": out})
     loaded = load_spec(spec, scalar)
-    data = [log_of(log, loaded, any_rate) for log in logs]
+    data = [log_of(log, loaded, any_rate, renamed) for log in logs]
     ranges_log = read_ranges(ranges, loaded)
     with progress(1000) as advance:
 

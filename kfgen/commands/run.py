@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kfgen.commands.options import (
     any_rate_option,
+    columns_option,
     example,
     keep_apart,
     load_spec,
@@ -45,6 +46,7 @@ LONG = 200_000
 @click.option("-o", "out", type=click.Path(path_type=Path), metavar="OUT.csv", help="Where the estimates go.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the estimates.")
 @any_rate_option
+@columns_option
 @scalar_option
 @ranges_option
 def run(
@@ -53,6 +55,7 @@ def run(
     out: Path | None,
     plot: Path | None,
     any_rate: bool,
+    renamed: Path | None,
     scalar: str | None,
     ranges: Path | None,
 ) -> None:
@@ -76,7 +79,7 @@ def run(
 
         require_matplotlib()
     loaded = load_spec(spec, scalar)
-    data = log_of(log, loaded, any_rate)
+    data = log_of(log, loaded, any_rate, renamed)
     kf = native.compile(loaded, log=read_ranges(ranges, loaded))
     with progress(data.rows, data.rows >= LONG) as advance:
         result = kf.run(data, lambda done, rows: advance(done, "running"))

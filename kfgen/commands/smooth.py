@@ -8,7 +8,15 @@ from pathlib import Path
 import click
 import numpy as np
 
-from kfgen.commands.options import any_rate_option, example, keep_apart, load_spec, log_of, spec_argument
+from kfgen.commands.options import (
+    any_rate_option,
+    columns_option,
+    example,
+    keep_apart,
+    load_spec,
+    log_of,
+    spec_argument,
+)
 from kfgen.commands.progress import progress
 
 LONG = 2000
@@ -23,7 +31,8 @@ LONG = 2000
 @click.argument("log", type=click.Path(path_type=Path), metavar="LOG.csv")
 @click.option("-o", "out", type=click.Path(path_type=Path), metavar="OUT.csv", help="Where the estimates go.")
 @any_rate_option
-def smooth(spec: Path, log: Path, out: Path | None, any_rate: bool) -> None:
+@columns_option
+def smooth(spec: Path, log: Path, out: Path | None, any_rate: bool, renamed: Path | None) -> None:
     """Write what the filter would have said of each row, had it known the whole log (Rauch-Tung-Striebel; of a ukf in
     its sigma-point form). In numpy, for what is done after a drive: nothing of it is emitted.
 
@@ -35,7 +44,7 @@ def smooth(spec: Path, log: Path, out: Path | None, any_rate: bool) -> None:
 
     keep_apart({"the log": log, "the spec": spec}, {"-o": out})
     loaded = load_spec(spec)
-    data = log_of(log, loaded, any_rate)
+    data = log_of(log, loaded, any_rate, renamed)
     with progress(data.rows, data.rows >= LONG) as advance:
         result = smoothing.smooth(loaded, data, lambda done, rows: advance(done, "filtering"))
     found = columns(loaded, result, np.float64)

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kfgen.commands.options import any_rate_option, example, keep_apart, load_spec, log_of, spec_argument
+from kfgen.commands.options import (
+    any_rate_option,
+    columns_option,
+    example,
+    keep_apart,
+    load_spec,
+    log_of,
+    spec_argument,
+)
 from kfgen.commands.progress import progress
 from kfgen.commands.tables import Part, Table, show
 from kfgen.errors import KfgenError
@@ -40,6 +48,7 @@ STRONG = 0.7  # a correlation that is worth a line
 @click.option("--robust", is_flag=True, help="Let no outlier pull more than one at the 99.9 % limit does.")
 @click.option("-o", "out", type=click.Path(path_type=Path), metavar="TUNED.yaml", help="The spec with the new numbers.")
 @any_rate_option
+@columns_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def tune(
     spec: Path,
@@ -50,6 +59,7 @@ def tune(
     robust: bool,
     out: Path | None,
     any_rate: bool,
+    renamed: Path | None,
     as_json: bool,
 ) -> None:
     """Fit numbers of a spec to logs, by the likelihood of the innovations: parameters, constants, std, var, density,
@@ -67,7 +77,7 @@ def tune(
 
     keep_apart({"the spec": spec, **{f"the log {log}": log for log in logs}}, {"-o": out})
     loaded = load_spec(spec)
-    data = [log_of(log, loaded, any_rate) for log in logs]
+    data = [log_of(log, loaded, any_rate, renamed) for log in logs]
     paths = [path.strip() for path in free.split(",") if path.strip()]
     if free and not paths:
         raise KfgenError("--free names nothing")

@@ -30,7 +30,9 @@ ALLOWED = {
     # the spec, and what reads only it
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
-    "logs": SPEC | {"files"},
+    "cells": {"errors"},
+    "columns": SPEC,
+    "logs": SPEC | {"cells", "columns", "files"},
     "reference": {"errors", "spec"},
     # from a spec to C
     "ir": {"errors"},
@@ -62,8 +64,8 @@ ALLOWED = {
     | {"status"},
     "layouts": {"emit"},
     "commands": SPEC
-    | {"advice", "check", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot", "reference"}
-    | {"report", "seal", "selftest", "simulate", "smoothing", "status", "tuning"},
+    | {"advice", "check", "columns", "cost", "files", "generate", "layouts", "logs", "native", "override", "plot"}
+    | {"reference", "report", "seal", "selftest", "simulate", "smoothing", "status", "tuning"},
     "cli": {"commands", "errors"},
     "__init__": SPEC | {"generate", "native", "reference", "report", "status", "tuning"},
     "__main__": {"cli"},
