@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import re
 import sys
@@ -11,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import IO, Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +113,8 @@ def cells_of(path: Path, source: str) -> Cells:
     """The cells of a file, of standard input (`-`), or of a Parquet file (by its ending).
 
     A CSV file is UTF-8 with or without a byte-order mark, with a header; semicolons or tabs between the cells, and
-    decimal commas beside those, are recognised. KfgenError for a file that is no table, or has rows of another length.
+    decimal commas beside those, are recognised; one that ends in .gz is unpacked. KfgenError for a file that is no
+    table, or has rows of another length.
     """
     cells = _parquet(path, source) if path.suffix.lower() in (".parquet", ".pq") else _csv(path, source)
     doubled = sorted(name for name, times in Counter(cells.header).items() if name and times > 1)
@@ -138,10 +140,13 @@ def _parquet(path: Path, source: str) -> ParquetCells:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[IO[str]]:
-    """A file as text; `-` is standard input."""
-    if str(path) != STANDARD_INPUT:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            yield stream
+    """A file as text, unpacked where it ends in .gz; `-` is standard input."""
+    if path.suffix == ".gz":
+        with gzip.open(path, "rt", encoding="utf-8-sig", newline="") as stream:
+            yield cast("IO[str]", stream)
+    elif str(path) != STANDARD_INPUT:
+        with path.open(encoding="utf-8-sig", newline="") as text:
+            yield text
     elif sys.stdin is None:
         raise KfgenError("the log is `-`, but there is no standard input")
     else:
@@ -168,6 +173,8 @@ def _csv(path: Path, source: str) -> CsvCells:
                     raise KfgenError(f"{source}:{reader.line_num}: {message}")
                 rows.append(row)
                 lines.append(reader.line_num)
+    except (gzip.BadGzipFile, EOFError):
+        raise KfgenError(f"{source}: not a packed file, though it ends in .gz") from None
     except UnicodeDecodeError:
         raise KfgenError(f"{source}: not a CSV file (not UTF-8 text)") from None
     except csv.Error as error:
