@@ -75,12 +75,12 @@ static void bicycle_h_radar(const bicycle_real_t x[5], bicycle_real_t z[3])
     const float y = x[BICYCLE_Y];
     const float speed = x[BICYCLE_SPEED];
     const float heading = x[BICYCLE_HEADING];
-    const float t0 = sqrtf(x_1 * x_1 + y * y);
-    z[0] = t0;
+    const float reach = sqrtf(x_1 * x_1 + y * y);
+    z[0] = reach;
     z[1] = atan2f(y, x_1);
     const float cos_heading = cosf(heading);
     const float sin_heading = sinf(heading);
-    z[2] = speed * (x_1 * cos_heading + y * sin_heading) / bicycle_max(t0, 0.01f);
+    z[2] = speed * (x_1 * cos_heading + y * sin_heading) / bicycle_max(reach, 0.01f);
 }
 
 /* what the points predict of radar: mean, covariance, covariances with the state */
@@ -1065,4 +1065,4 @@ void bicycle_get_covariance(const bicycle_t *kf, bicycle_real_t P[25])
         }
     }
 }
-/* kfgen: body 306c58bc9c696d16114ce51ccb5bdc37 */
+/* kfgen: body 801d36bf27703d57f75e3699054d9b6e */

@@ -21,7 +21,7 @@
  *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * ab89ae7c634a62288f07efc278b2b5ef2ab159ce4643084df02d2b3418afefcd
+ * e004bbbc2617c31db4d59519989cd743dcb410ee0cea1083664a5f7cfe48b53c
  * This file and bicycle.c are yours: use, change and ship them without condition.
  */
 #ifndef BICYCLE_H_INCLUDED
