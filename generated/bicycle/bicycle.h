@@ -21,7 +21,7 @@
  *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * e004bbbc2617c31db4d59519989cd743dcb410ee0cea1083664a5f7cfe48b53c
+ * 6f0b96ac477f233bdd5a0b5e7392a8ccbdad232a962cd88853b8bed943f64340
  * This file and bicycle.c are yours: use, change and ship them without condition.
  */
 #ifndef BICYCLE_H_INCLUDED
