@@ -1,4 +1,4 @@
-# make demo   build specs/vehicle.yaml, simulate a log, run the filter over it, plot
+# make demo   build specs/vehicle.yaml, simulate a log, run the filter over it, plot; report on a recorded drive
 # make test   all tests but those that are marked long
 # make lint   style, types, and whether generated/ is up to date
 # make bench  instructions, flash, RAM and stack on an emulated Cortex-M4F
@@ -12,6 +12,8 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3; do \
 SPEC ?= specs/vehicle.yaml
 NAME = $(basename $(notdir $(SPEC)))
 SIMULATE ?= $(if $(filter vehicle,$(NAME)),--steps 1000 --seed 4 --every gnss=5)
+REAL ?= $(wildcard tests/data/$(NAME).csv)
+COMMA = ,
 TESTFLAGS ?=
 
 .PHONY: demo test lint bench golden clean
@@ -20,11 +22,13 @@ demo: .venv/.plot
 	.venv/bin/kfgen build $(SPEC) -o out
 	.venv/bin/kfgen simulate $(SPEC) $(SIMULATE) -o out/$(NAME)/log.csv
 	.venv/bin/kfgen run $(SPEC) out/$(NAME)/log.csv -o out/$(NAME)/estimate.csv --plot out/$(NAME)/estimate.png
+	$(if $(REAL),.venv/bin/kfgen report $(SPEC) --log $(REAL) -o out/$(NAME)/report.html)
 	@echo
 	@echo "the filter:        out/$(NAME)/$(NAME).h, out/$(NAME)/$(NAME).c"
 	@echo "a simulated log:   out/$(NAME)/log.csv"
 	@echo "what it estimates: out/$(NAME)/estimate.csv"
 	@echo "truth, measurements, estimate and 2 sigma: out/$(NAME)/estimate.png"
+	@$(if $(REAL),echo "what of it is consistent on $(REAL)$(COMMA) and what is not: out/$(NAME)/report.html")
 
 test: .venv/.test
 	.venv/bin/python -m pytest $(TESTFLAGS)

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from kfgen.native import compile as compile
     from kfgen.native import compile_many as compile_many
     from kfgen.reference import reference as reference
+    from kfgen.report import report as report
     from kfgen.spec import load as load
+    from kfgen.tuning import tune as tune
 
 __version__ = "0.1.0"
 
@@ -41,10 +43,12 @@ __all__ = [
     "generate",
     "load",
     "reference",
+    "report",
+    "tune",
 ]
 
-_FUNCTIONS = {"load": "kfgen.spec", "compile": "kfgen.native", "compile_many": "kfgen.native"}
-_CALLABLE_MODULES = ("generate", "reference")
+_FUNCTIONS = {"load": "kfgen.spec", "compile": "kfgen.native", "compile_many": "kfgen.native", "tune": "kfgen.tuning"}
+_CALLABLE_MODULES = ("generate", "reference", "report")
 
 
 class _CallableModule(ModuleType):

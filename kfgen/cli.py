@@ -20,9 +20,12 @@ from kfgen.commands.diff import diff
 from kfgen.commands.doctor import doctor
 from kfgen.commands.language import language
 from kfgen.commands.new import new
+from kfgen.commands.report import report
 from kfgen.commands.run import run
 from kfgen.commands.schema import schema
 from kfgen.commands.simulate import simulate
+from kfgen.commands.smooth import smooth
+from kfgen.commands.tune import tune
 from kfgen.errors import KfgenError
 
 # matrices here are small: a pool of threads only makes them wait for each other
@@ -82,7 +85,8 @@ def cli() -> None:
     """Turn Kalman-filter specs in YAML into specialised C."""
 
 
-for command in (new, build, check, run, simulate, cost, diff, language, schema, doctor):
+_COMMANDS = (new, build, check, run, report, tune, smooth, simulate, cost, diff, language, schema, doctor)
+for command in _COMMANDS:
     cli.add_command(command)
 
 

@@ -3,10 +3,7 @@ no measurement."""
 
 from __future__ import annotations
 
-import csv
 import os
-import re
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -17,6 +14,8 @@ from typing import IO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kfgen.cells import STANDARD_INPUT, cells_of
+from kfgen.columns import Columns, Origin
 from kfgen.errors import KfgenError
 from kfgen.files import writing
 from kfgen.spec.sensors import columns_of, late_columns
@@ -24,12 +23,9 @@ from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
 
-# decimal numbers and NaN; float() would also take `1_000`, other scripts' digits and `infinity`
-_NUMBER = re.compile(r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|nan|inf)", re.ASCII | re.IGNORECASE)
 _CHUNK = 1 << 14  # rows that are turned into text at a time
 _FEW = 1000  # names among which a misspelt one is looked for
 _RATE, _GAP, _GAPS = 0.05, 1.5, 0.01  # of dt: by how much the usual step may differ, what is a gap; how many may be
-_ODD = re.compile(r"[^0-9eE.+\-naNA]")
 
 
 @dataclass(frozen=True)
@@ -37,16 +33,26 @@ class Log:
     """Columns of equal length, NaN where a cell is empty.
 
     columns: name -> float64 [rows]. ignored: names of columns the spec does not know (`true.*` is never among
-    them). source: the file, for messages.
+    them). source: the file, for messages. said: how it was read, where that is not usual.
     """
 
     columns: Mapping[str, Array]
     rows: int
     source: str = "<log>"
     ignored: tuple[str, ...] = field(default=())
+    said: tuple[str, ...] = field(default=())
 
 
 Source = Log | Mapping[str, ArrayLike] | str | os.PathLike[str]
+
+
+def held(column: Array, name: str, source: str) -> Array:
+    """An input's column whose empty cells take the last value before them; KfgenError where the first is empty."""
+    there = ~np.isnan(column)
+    if column.size and not there[0]:
+        raise KfgenError(f"{source}: input `{name}` is empty in the first row; there is no value to keep")
+    last = np.maximum.accumulate(np.where(there, np.arange(column.size), 0))
+    return column[last]
 
 
 def needed_columns(spec: Spec, known: Collection[str] | None = None) -> list[str]:
@@ -83,53 +89,40 @@ def as_log(source: Source, spec: Spec) -> Log:
     return Log(columns, rows=next(iter(lengths))[0] if lengths else 0)
 
 
-def read(path: str | os.PathLike[str], spec: Spec) -> Log:
-    """Read a CSV file: UTF-8 with or without a byte-order mark, a header row, columns in any order.
+def read(path: str | os.PathLike[str], spec: Spec, columns: Columns | None = None) -> Log:
+    """Read a file, in whatever `kfgen.cells` reads: a header, columns in any order; `-` is standard input.
 
-    `nan` counts as empty, blank lines are skipped. KfgenError (`file:line: ...`) for a missing column, a cell
-    that is no number, a row of another length, a file that is no CSV or holds no rows; OSError if it cannot
-    be read.
+    columns: which of the spec's columns come from others, and in what unit. `nan` and `NA` count as empty, blank lines
+    are skipped. KfgenError (`file:line: ...`) for a missing column, a cell that is no number, a row of another length,
+    a file that is no table or holds no rows; OSError if it cannot be read.
     """
-    source = os.fspath(path)
-    header, rows, lines = _cells(Path(path), source)
+    source = "standard input" if os.fspath(path) == STANDARD_INPUT else os.fspath(path)
+    cells = cells_of(Path(path), source)
+    origins = dict(columns or {})
+    absent = [(name, origin.name) for name, origin in origins.items() if origin.name not in cells.header]
+    if absent:
+        name, other = absent[0]
+        has = f"the log has: {listed(cells.header)}"
+        raise KfgenError(f"{source}: column `{other}`, which `{name}` is to come from, is missing ({has})")
+    used = {origin.name for origin in origins.values()}
+    known = [*origins, *(name for name in cells.header if name not in used and name not in origins)]
     needed = needed_columns(spec)
-    _require(header, needed, source)
-    if not rows:
+    _require(known, needed, source)
+    if not cells.rows:
         raise KfgenError(f"{source}: the log has a header but no rows")
-    known = {*needed, *late_columns(spec), "t"}
-    wanted = [name for name in header if name in known or name.startswith("true.")]
-    columns = {name: _column(name, header.index(name), rows, lines, source) for name in wanted}
-    ignored = tuple(name for name in header if name not in columns)
-    if "t" in columns:
-        _check_times(columns["t"], lines, source)
-    return Log(columns, len(rows), source, ignored)
-
-
-def _cells(path: Path, source: str) -> tuple[list[str], list[list[str]], list[int]]:
-    rows: list[list[str]] = []
-    lines: list[int] = []
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(stream, strict=True)
-            header = [name.strip() for name in next(reader, [])]
-            if not any(header):
-                raise KfgenError(f"{source}: the log is empty; its first line must name the columns")
-            for row in reader:
-                if len(row) != len(header):
-                    if not any(cell.strip() for cell in row):
-                        continue
-                    message = f"{len(row)} cells, but the header has {len(header)}"
-                    raise KfgenError(f"{source}:{reader.line_num}: {message}")
-                rows.append(row)
-                lines.append(reader.line_num)
-    except UnicodeDecodeError:
-        raise KfgenError(f"{source}: not a CSV file (not UTF-8 text)") from None
-    except csv.Error as error:
-        raise KfgenError(f"{source}:{reader.line_num}: not a CSV file ({error})") from None
-    doubled = sorted(name for name, times in Counter(header).items() if name and times > 1)
-    if doubled:
-        raise KfgenError(f"{source}:1: column `{doubled[0]}` occurs twice")
-    return header, rows, lines
+    found: dict[str, Array] = {}
+    wanted = {*needed, *late_columns(spec), "t"}
+    for name in known:
+        if name in wanted or name.startswith("true."):
+            origin = origins.get(name, Origin(name))
+            column = cells.column(origin.name)
+            found[name] = column if origin == Origin(origin.name) else column * origin.scale + origin.offset
+    ignored = tuple(name for name in known if name not in found)
+    if "t" in found:
+        wrong = np.flatnonzero(~np.isfinite(found["t"]))
+        if wrong.size:
+            raise KfgenError(f"{cells.where(int(wrong[0]))}: column `t`: the time is empty or not finite")
+    return Log(found, cells.rows, source, ignored, cells.said)
 
 
 def _require(known: Collection[str], needed: Sequence[str], source: str) -> None:
@@ -139,9 +132,7 @@ def _require(known: Collection[str], needed: Sequence[str], source: str) -> None
     text = f"{source}: column {', '.join(f'`{name}`' for name in missing)} is missing"
     some = list(islice(known, _FEW))
     close = [name for each in missing[:_FEW] for name in get_close_matches(each, some, 1)]
-    if len(known) == 1 and re.search(r"[;\t]", next(iter(known))):
-        text += "; the columns must be separated by commas"
-    elif close:
+    if close:
         text += f"; did you mean `{close[0]}`?"
     raise KfgenError(f"{text} (the log has: {listed(known) or 'nothing'})")
 
@@ -179,25 +170,6 @@ def check_rate(log: Log, dt: float) -> None:
             f"{log.source}: {gaps} of {steps.size} steps of t are longer than {_GAP:g} dt (the longest "
             f"{steps.max():g} s, dt is {dt:g} s): rows are missing, and one prediction stands for several; {cure}"
         )
-
-
-def _column(name: str, index: int, rows: Sequence[Sequence[str]], lines: Sequence[int], source: str) -> Array:
-    cells = [row[index].strip() or "nan" for row in rows]
-    try:
-        if not any(map(_ODD.search, cells)):
-            return np.array(cells, dtype=np.float64)
-    except ValueError:
-        pass
-    for cell, line in zip(cells, lines, strict=True):
-        if not _NUMBER.fullmatch(cell):
-            raise KfgenError(f"{source}:{line}: column `{name}`: {cell[:40]!r} is not a number")
-    return np.array(cells, dtype=np.float64)
-
-
-def _check_times(t: Array, lines: Sequence[int], source: str) -> None:
-    wrong = np.flatnonzero(~np.isfinite(t))
-    if wrong.size:
-        raise KfgenError(f"{source}:{lines[wrong[0]]}: column `t`: the time is empty or not finite")
 
 
 def write(path: Path, columns: Mapping[str, NDArray[np.generic]]) -> None:

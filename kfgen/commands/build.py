@@ -100,7 +100,11 @@ def build(
 
 
 def generate_all(
-    paths: Sequence[Path], directory: Path, scalar: str | None, selftest: bool = False, layout: str = "plain",
+    paths: Sequence[Path],
+    directory: Path,
+    scalar: str | None,
+    selftest: bool = False,
+    layout: str = "plain",
     log: Path | None = None,
 ) -> list[Built]:
     """Generate every spec; a SpecError holds the mistakes of all of them. KfgenError for two of one name."""

@@ -38,6 +38,34 @@ def read_ranges(path: Path | None, spec: Spec) -> Log | None:
     return read(path, spec)
 
 
+any_rate_option = click.option(
+    "--any-rate", is_flag=True, help="With a fixed dt: take a log whose steps are others all the same."
+)
+
+
+columns_option = click.option(
+    "--columns", "renamed", type=click.Path(path_type=Path), metavar="FILE.yaml",
+    help="Names and units of a foreign log: `t: {from: time_ms, scale: 1e-3}`.",
+)  # fmt: skip
+
+
+def log_of(path: Path, spec: Spec, any_rate: bool, renamed: Path | None = None) -> Log:
+    """The log of a file (`-`: of standard input), whose rate has to fit a fixed dt; it tells of ignored columns, and of
+    an unusual form. renamed: a file that maps names and units."""
+    from kfgen import logs
+    from kfgen.columns import load_columns
+    from kfgen.native.run import fixed_step
+
+    data = logs.read(path, spec, None if renamed is None else load_columns(renamed))
+    for said in data.said:
+        click.echo(f"kfgen: {data.source}: {said}", err=True)
+    if data.ignored:
+        click.echo(f"kfgen: ignored columns of {data.source}: {logs.listed(data.ignored)}", err=True)
+    if fixed_step(spec) and not any_rate:
+        logs.check_rate(data, fixed_step(spec))
+    return data
+
+
 quiet_option = click.option("--quiet", is_flag=True, help="No advice on what a spec may not mean.")
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 from numpy.typing import NDArray
 
 from kfgen.commands.options import (
+    any_rate_option,
+    columns_option,
     example,
     keep_apart,
     load_spec,
+    log_of,
     ranges_option,
     read_ranges,
     scalar_option,
@@ -42,7 +45,8 @@ LONG = 200_000
 @click.argument("log", type=click.Path(path_type=Path), metavar="LOG.csv")
 @click.option("-o", "out", type=click.Path(path_type=Path), metavar="OUT.csv", help="Where the estimates go.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="OUT.png", help="Draw the estimates.")
-@click.option("--any-rate", is_flag=True, help="With a fixed dt: run a log whose steps are others all the same.")
+@any_rate_option
+@columns_option
 @scalar_option
 @ranges_option
 def run(
@@ -51,6 +55,7 @@ def run(
     out: Path | None,
     plot: Path | None,
     any_rate: bool,
+    renamed: Path | None,
     scalar: str | None,
     ranges: Path | None,
 ) -> None:
@@ -70,7 +75,6 @@ def run(
     out_std.<output>. It goes to OUT.csv, or to stdout if neither -o nor --plot is given.
     """
     from kfgen import logs, native
-    from kfgen.native.run import fixed_step
 
     keep_apart({"the log": log, "the spec": spec}, {"-o": out, "--plot": plot})
     if plot is not None:
@@ -78,11 +82,7 @@ def run(
 
         require_matplotlib()
     loaded = load_spec(spec, scalar)
-    data = logs.read(log, loaded)
-    if data.ignored:
-        click.echo(f"kfgen: ignored columns of {log}: {logs.listed(data.ignored)}", err=True)
-    if fixed_step(loaded) and not any_rate:
-        logs.check_rate(data, fixed_step(loaded))
+    data = log_of(log, loaded, any_rate, renamed)
     kf = native.compile(loaded, log=read_ranges(ranges, loaded), history=loaded.history is not None)
     with progress(data.rows, data.rows >= LONG) as advance:
         result = kf.run(data, lambda done, rows: advance(done, "running"))
@@ -102,9 +102,11 @@ def run(
         sys.exit(1)
 
 
-def columns(spec: Spec, result: RunResult) -> dict[str, NDArray[np.generic]]:
-    """A run as columns of a CSV file; numbers keep the filter's own precision."""
-    own = np.float32 if spec.scalar == FLOAT else np.float64  # so that they print as short as they are
+def columns(
+    spec: Spec, result: RunResult, precision: type[np.floating[Any]] | None = None
+) -> dict[str, NDArray[np.generic]]:
+    """A run as columns of a CSV file; numbers keep the filter's own precision, or have the one that is given."""
+    own = precision or (np.float32 if spec.scalar == FLOAT else np.float64)  # so that they print as short as they are
     out: dict[str, NDArray[np.generic]] = {"t": result.t}
     names = [state.name for state in spec.states]
     wide = spec.code.compensated

@@ -50,6 +50,7 @@ class HistoryView:
     setters: tuple[SetterView, ...]
     inputs: str
     parameters: bool
+    likelihood: bool  # whether the filter keeps its log-likelihood
 
 
 def history_view(code: FilterCode, view: View, scalar: Scalar) -> HistoryView | None:
@@ -77,6 +78,7 @@ def history_view(code: FilterCode, view: View, scalar: Scalar) -> HistoryView | 
         wanted.steps, wanted.per_step, wanted.keep, kept, kept * wanted.keep, 0, "u" in public["predict"].arguments,
         "dt" in public["predict"].arguments, tuple(updates), setters,
         ", ".join(with_unit(i.name, i.unit) for i in spec.inputs), bool(spec.parameters),
+        spec.code.log_likelihood,
     )  # fmt: skip
     return replace(found, ram=_ram(found, view, scalar))
 
@@ -101,7 +103,8 @@ def _ram(h: HistoryView, view: View, scalar: Scalar) -> int:
     step = [(size * h.per_step, align), *([inputs] if h.predict_u else []), *([(real, real)] if h.predict_dt else [])]
     step_size, step_align = _struct([*step, (1, 1)])
     own = max(4, real)  # a filter holds reals, and perhaps counters
-    whole = [(view.ram * (1 + h.kept), own), (step_size * h.ring, step_align), (real, real), (8, 4)]
+    whole = [(view.ram * (1 + h.kept), own), (step_size * h.ring, step_align)]
+    whole += [(real * (1 + h.likelihood), real), (8, 4)]
     return _struct(whole)[0]
 
 

@@ -138,9 +138,7 @@ def _influence(
     return Influence("custom", None, psi, slope)
 
 
-def _inflation(
-    adaptive: Adaptive, robust: bool, optional: Callable[[Expression | None], Fraction | None]
-) -> Inflation:
+def _inflation(adaptive: Adaptive, robust: bool, optional: Callable[[Expression | None], Fraction | None]) -> Inflation:
     default = _ADAPTIVE_ROBUST if robust else _ADAPTIVE
     probability = optional(adaptive.probability)
     return Inflation(default if probability is None else probability, optional(adaptive.chi2))

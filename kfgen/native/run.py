@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.errors import KfgenError
 from kfgen.late import ages
-from kfgen.logs import Log, Source, as_log
+from kfgen.logs import Log, Source, as_log, held
 from kfgen.native.struct import Struct
 from kfgen.native.values import Array
 from kfgen.spec.constants import value
@@ -32,7 +31,8 @@ class RunResult:
     the row. calls: function -> [N] uint32, its own status (0 where it was not called). mu: [N, modes] for an
     imm, else None. outputs, output_std: name -> [N], what the spec's `outputs` are after the row, and their standard
     deviations; NaN where the filter refuses to tell them. age: sensor -> [N], how many predictions late its reading
-    was, where the filter has a history.
+    was, where the filter has a history. P: [N, n, n], the whole covariance, where it was asked for. log_likelihood:
+    sensor -> [N], NaN as in nis and where the update was gated, where the spec keeps it.
     """
 
     t: Array
@@ -45,6 +45,8 @@ class RunResult:
     outputs: Mapping[str, Array] = field(default_factory=dict)
     output_std: Mapping[str, Array] = field(default_factory=dict)
     age: Mapping[str, NDArray[np.uint32]] = field(default_factory=dict)
+    P: Array | None = None
+    log_likelihood: Mapping[str, Array] | None = None
 
     def late(self) -> dict[str, tuple[int, float, int]]:
         """Of sensors whose readings came late: how many did, how many predictions on average, and at most; without
@@ -66,7 +68,6 @@ class RunResult:
             if number:
                 found[function] = number
         return found
-
 
     @property
     def failed(self) -> bool:
@@ -117,7 +118,7 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
             step[1:] = np.diff(t) != 0
     u = np.empty((rows, len(spec.inputs)))
     for i, each in enumerate(spec.inputs):
-        u[:, i] = _held(columns[each.name], each.name, log.source)
+        u[:, i] = held(columns[each.name], each.name, log.source)
     mask = np.zeros((rows, len(spec.measurements)), dtype=np.uint32)
     values: list[Array] = []
     absent = np.full(rows, np.nan)
@@ -134,24 +135,24 @@ def plan(spec: Spec, log: Log, dt: float = 0.0) -> Plan:
     return Plan(t, steps, difference, u, mask, z, age)
 
 
-def _held(column: Array, name: str, source: str) -> Array:
-    """Empty cells take the last value before them."""
-    there = ~np.isnan(column)
-    if column.size and not there[0]:
-        raise KfgenError(f"{source}: input `{name}` is empty in the first row; there is no value to keep")
-    last = np.maximum.accumulate(np.where(there, np.arange(column.size), 0))
-    return column[last]
-
-
 def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int], None] | None = None) -> RunResult:
     """Run the filter of a struct over a log (a path, a mapping of columns, or a Log), on from its present state.
 
     See `plan` for what is done in a row. The filter's errors are in the result, none is raised. `progress` is
     called with (rows done, rows) now and then. KfgenError for a log that does not fit the spec.
     """
-    log = as_log(source, spec)
-    work = plan(spec, log, fixed_step(spec))
-    rows, n, sensors = log.rows, len(spec.states), len(spec.measurements)
+    return follow(struct, spec, plan(spec, as_log(source, spec), fixed_step(spec)), progress)
+
+
+def follow(
+    struct: Struct,
+    spec: Spec,
+    work: Plan,
+    progress: Callable[[int, int], None] | None = None,
+    whole: bool = False,
+) -> RunResult:
+    """The same of calls that are planned already. whole: with the covariance of each row."""
+    rows, n, sensors = len(work.t), len(spec.states), len(spec.measurements)
     errors = len(spec.errors)
     modes = len(spec.imm.modes) if spec.imm else 0
     scalar, units = struct.value, struct.units
@@ -166,7 +167,9 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         "x": np.zeros((rows, n), scalar.dtype),
         "rest": np.zeros((rows, len(struct.compensated)), scalar.dtype),
         "var": np.zeros((rows, errors), scalar.dtype),
+        "cov": np.zeros((rows if whole else 0, errors * errors), scalar.dtype),
         "nis": np.zeros((rows, sensors), scalar.dtype),
+        "ll": np.zeros((rows, sensors), scalar.dtype),
         "mu": np.zeros((rows, modes), scalar.dtype),
         "out": np.zeros((rows, len(spec.outputs)), scalar.dtype),
         "deviation": np.zeros((rows, len(spec.outputs)), scalar.dtype),
@@ -180,6 +183,8 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
     nis = scalar.to_physical(arrays["nis"], units.one)
     status: NDArray[np.uint32] = arrays["status"]
     updated = (arrays["mask"] != 0) & (status[:, 1:] < ERROR)
+    accepted = updated & (status[:, 1:] & Status.GATED.value == 0)
+    ll = scalar.to_physical(arrays["ll"], units.one)
     functions = ["predict", *(f"update_{name}" for name in units.z)]
     x = scalar.to_physical(arrays["x"], units.x)
     x[:, list(struct.compensated)] += arrays["rest"].astype(np.float64)
@@ -200,6 +205,10 @@ def run(struct: Struct, spec: Spec, source: Source, progress: Callable[[int, int
         outputs=told["out"],
         output_std=told["deviation"],
         age={name: work.age[:, i] for i, name in enumerate(units.z)} if struct.has_past else {},
+        P=scalar.to_physical(arrays["cov"].reshape(rows, errors, errors), units.P) if whole else None,
+        log_likelihood={name: np.where(accepted[:, i], ll[:, i], np.nan) for i, name in enumerate(units.z)}
+        if spec.code.log_likelihood
+        else None,
     )
 
 

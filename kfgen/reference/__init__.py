@@ -14,11 +14,15 @@ if TYPE_CHECKING:
     from kfgen.reference.filter import ReferenceFilter
     from kfgen.reference.imm import ReferenceImm
     from kfgen.reference.log import Run
+    from kfgen.reference.rts import Smoothed, smooth
     from kfgen.reference.status import Status
 
-__all__ = ["ReferenceFilter", "ReferenceImm", "Run", "Status", "reference"]
+__all__ = ["ReferenceFilter", "ReferenceImm", "Run", "Smoothed", "Status", "reference", "smooth"]
 
-_HOMES = {"reference": "build", "ReferenceFilter": "filter", "ReferenceImm": "imm", "Run": "log", "Status": "status"}
+_HOMES = {
+    "reference": "build", "smooth": "rts", "Smoothed": "rts", "ReferenceFilter": "filter", "ReferenceImm": "imm",
+    "Run": "log", "Status": "status",
+}  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -26,17 +26,28 @@ from kfgen.spec.types import Filter
 
 
 @dataclass(frozen=True)
+class Passage:
+    """A prediction as a smoother goes back over it: x (n) and P (n, n) after it, cross (n, n): the covariance of the
+    state before it with the state after it."""
+
+    x: Vector
+    P: Matrix
+    cross: Matrix
+
+
+@dataclass(frozen=True)
 class Estimate:
     """x (nx), P (n, n), and whatever else the algorithm keeps between two steps.
 
     memory: what belongs to this very x and P, and is dropped when either is set. adapted: noise covariances
-    learnt so far, which outlast that.
+    learnt so far, which outlast that. passage: the last prediction, where a smoother can go back over it.
     """
 
     x: Vector
     P: Matrix
     memory: object = None
     adapted: Adapted = NOTHING
+    passage: Passage | None = None
 
 
 @dataclass(frozen=True)

@@ -76,5 +76,3 @@ def _with_correlated(
             if names[i] in found:
                 found |= {names[j] for j, entry in enumerate(row) if model.scope.constant(entry) != 0}
     return tuple(name for name in names if name in found)
-
-

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kfgen.reference.adapt import Adapted
-from kfgen.reference.algorithm import Algorithm, Correction, Estimate, Innovation
+from kfgen.reference.algorithm import Algorithm, Correction, Estimate, Innovation, Passage
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.joseph import Update, update
 from kfgen.reference.linalg import symmetric
@@ -58,7 +58,8 @@ class Ekf(Algorithm):
         P = symmetric(F @ estimate.P @ F.T + transition.Q)
         x, P, flags = self.limits.finish(transition.x, P, context)
         adapted = self.adaptation.after_step(estimate.adapted, context)
-        return replace(estimate, x=x, P=P, memory=None, adapted=adapted), flags
+        passage = Passage(x, P, estimate.P @ F.T)
+        return replace(estimate, x=x, P=P, memory=None, adapted=adapted, passage=passage), flags
 
     def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
         """y = z - h(x), S = H P H^T + R + M Re M^T; nis = y^T S^-1 y."""
@@ -85,9 +86,7 @@ class Ekf(Algorithm):
         adapted = self._adapted(estimate.adapted, reading, measured.noise, x, result)
         return Correction(Estimate(x, P, adapted=adapted), result.log_likelihood, flags | result.flags)
 
-    def _adapted(
-        self, adapted: Adapted, reading: Reading, noise: Matrix | None, x: Vector, result: Update
-    ) -> Adapted:
+    def _adapted(self, adapted: Adapted, reading: Reading, noise: Matrix | None, x: Vector, result: Update) -> Adapted:
         """What an update that stores x (nx) leaves of the adapted covariances."""
         if noise is not None:
             adapted = self.adaptation.with_noise(adapted, reading, noise, reading.sensor.residual(x, reading))

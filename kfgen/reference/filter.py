@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kfgen.reference.algorithm import Correction, Estimator
+from kfgen.reference.algorithm import Correction, Estimate, Estimator
 from kfgen.reference.arguments import components_used, own_inputs
 from kfgen.reference.clock import Clock, step_of
 from kfgen.reference.dual import Matrix, Vector
@@ -31,6 +31,7 @@ class ReferenceFilter:
 
     Attributes (arrays are copies):
         x (nx), P (n, n): the estimate, in the spec's order of the states; of a quaternion P has three errors.
+        estimate: with what else is kept of it.
         nis: normalised innovation squared of the last update, also of a gated one; 0 after init.
         log_likelihood: of the last update that was made.
         t: seconds since init.
@@ -61,6 +62,10 @@ class ReferenceFilter:
     @property
     def P(self) -> Matrix:
         return self._estimate.P.copy()
+
+    @property
+    def estimate(self) -> Estimate:
+        return self._estimate
 
     @property
     def sqrt_covariance(self) -> Matrix:
@@ -253,7 +258,7 @@ class ReferenceFilter:
         except np.linalg.LinAlgError:  # numbers near the end of their range
             return int(Status.NOT_FINITE)
 
-    def run(self, log: Mapping[str, Sequence[float]]) -> Run:
+    def run(self, log: Mapping[str, ArrayLike]) -> Run:
         """Replays a log from the filter's present state: see kfgen.reference.log.replay."""
         return replay(self, log)
 

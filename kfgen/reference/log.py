@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kfgen.reference.arguments import components_used
 from kfgen.reference.dual import Matrix, Vector
@@ -33,8 +33,8 @@ class Run:
     output_std: dict[str, Vector] = field(default_factory=dict)
 
 
-def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
-    """Per row: predict, then the updates in the spec's order.
+def replay(kf: Replayed, log: Mapping[str, ArrayLike], seen: Callable[[int], None] = lambda row: None) -> Run:
+    """Per row: predict, then the updates in the spec's order; then `seen` is called with the row.
 
     The log maps columns (`t` in s, `<input>`, `<sensor>.<component>`, `<sensor>.<its own input>`) to values, NaN where
     there is no measurement. Run-time dt: t minus the last row's t, no predict in the first row and for equal t; fixed
@@ -88,6 +88,7 @@ def replay(kf: Replayed, log: Mapping[str, Sequence[float]]) -> Run:
             for course, told in ((result.outputs, kf.outputs), (result.output_std, kf.output_std)):
                 for name, number in told.items():
                     course.setdefault(name, np.zeros(rows))[row] = number
+        seen(row)
     return result
 
 

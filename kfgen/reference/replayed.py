@@ -18,7 +18,9 @@ class Replayed(Protocol):
 
     spec: Spec
     model: Model
-    nis: float
+
+    @property
+    def nis(self) -> float: ...
 
     @property
     def sensors(self) -> Mapping[str, SensorModel]: ...

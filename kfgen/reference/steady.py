@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, block_diag, solve_discrete_are
 
 from kfgen.errors import SpecError
-from kfgen.reference.algorithm import Correction, Estimate, Innovation
+from kfgen.reference.algorithm import Correction, Estimate, Innovation, Passage
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.ekf import Ekf
 from kfgen.reference.joseph import Update, update
@@ -29,7 +29,7 @@ _DECAYS = 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
-class _Turn:
+class Turn:
     """A sensor's place in the cycle: P (n, n) before its update, its H (m, n) and R (m, m)."""
 
     P: Matrix
@@ -64,7 +64,7 @@ class Steady(Ekf):
                 turns, after = self._cycle(P)
         except StepError:
             raise self._refusal("the covariance does not stay one") from None
-        self._turns = dict(zip(self._names, turns, strict=True))
+        self.turns = dict(zip(self._names, turns, strict=True))
         self._after = after
 
     def initial(self) -> Estimate:
@@ -72,13 +72,17 @@ class Steady(Ekf):
 
     def predict(self, estimate: Estimate, context: Context) -> tuple[Estimate, Status]:
         """x <- f(x, u)."""
-        return replace(estimate, x=self._finish(self.process.linearise(estimate.x, context).x)), Status.OK
+        transition = self.process.linearise(estimate.x, context)
+        x = self._finish(transition.x)
+        before_first = next(iter(self.turns.values())).P
+        passage = Passage(x, before_first, self._after @ transition.F.T)
+        return replace(estimate, x=x, passage=passage), Status.OK
 
     def innovate(self, estimate: Estimate, reading: Reading) -> Innovation:
         """y = z - h(x); nis by the constant S."""
         h = reading.sensor.linearise(estimate.x, reading).h
         y = reading.sensor.innovation(h, estimate.x, reading)
-        turn = self._turns[reading.sensor.name]
+        turn = self.turns[reading.sensor.name]
         nis = update(turn.P, turn.H, turn.R, y, self.treatment.plain).nis
         if not math.isfinite(nis):
             raise StepError(Status.NOT_FINITE)
@@ -88,7 +92,7 @@ class Steady(Ekf):
         """x <- x + K y."""
         y = innovation.detail
         assert isinstance(y, np.ndarray)
-        turn = self._turns[reading.sensor.name]
+        turn = self.turns[reading.sensor.name]
         result = update(turn.P, turn.H, turn.R, y, self._rules)
         x = self._finish(estimate.x + result.dx)
         return Correction(replace(estimate, x=x), result.log_likelihood, result.flags)
@@ -116,15 +120,15 @@ class Steady(Ekf):
                 continue
         raise self._refusal("the model has no finite values")
 
-    def _cycle(self, P: Matrix) -> tuple[list[_Turn], Matrix]:
+    def _cycle(self, P: Matrix) -> tuple[list[Turn], Matrix]:
         """The turns of all sensors, from the covariance before the first of them; and that after the last."""
         turns = []
         for H, R in zip(self._H, self._R, strict=True):
-            turns.append(_Turn(P, H, R))
+            turns.append(Turn(P, H, R))
             P = self._limited(self._updated(turns[-1], np.zeros(len(R))).P)
         return turns, P
 
-    def _updated(self, turn: _Turn, y: Vector) -> Update:
+    def _updated(self, turn: Turn, y: Vector) -> Update:
         return update(turn.P, turn.H, turn.R, y, self._rules)
 
     def _limited(self, P: Matrix) -> Matrix:

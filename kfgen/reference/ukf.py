@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kfgen.reference.algorithm import Algorithm, Correction, Estimate, Innovation
+from kfgen.reference.algorithm import Algorithm, Correction, Estimate, Innovation, Passage
 from kfgen.reference.carried import carried_by_process, wrapped_by_process
 from kfgen.reference.chi2 import chi2_quantile
 from kfgen.reference.cloud import Cloud, Drawing
@@ -83,7 +83,8 @@ class Ukf(Algorithm):
             turn = np.array([stored[i] - mean[i] if i in self.model.periods else 0.0 for i in range(len(mean))])
             points = np.array([space.moved(mean, deviation) for deviation in images.deviations])
             kept = Cloud(points + turn, np.zeros((len(images.e), 0)), images)
-        return replace(estimate, x=stored, P=P, memory=kept), flags | gone | more
+        passage = Passage(stored, P, cloud.states.covariance(images))
+        return replace(estimate, x=stored, P=P, memory=kept, passage=passage), flags | gone | more
 
     def _images(self, cloud: Cloud, context: Context) -> tuple[Images, Status]:
         """f at the points, within the bounds; those that are rejected replaced by f at the centre.

@@ -256,3 +256,19 @@ def test_a_reader_that_has_gone_away(folder, command):
     os.close(writer)
     assert done.returncode != 0
     assert done.stderr == b""
+
+
+def test_a_foreign_log(kfgen, log):
+    text = Path(log).read_text().splitlines()
+    head = text[0].replace("t,", "time;", 1).replace(",", ";")
+    rows = [";".join(f"{float(c) * 1000:.17g}".replace(".", ",") if i == 0 else c.replace(".", ",") for i, c in
+                     enumerate(row.split(","))) for row in text[1:]]  # fmt: skip
+    Path("foreign.csv").write_text("\n".join([head, *rows]))
+    Path("names.yaml").write_text("t: {from: time, scale: 1e-3}\n")
+    mine = kfgen("run", SPEC, log)
+    theirs = kfgen("run", SPEC, "foreign.csv", "--columns", "names.yaml")
+    assert theirs.exit_code == 0
+    assert "semicolons, numbers to have decimal commas" in theirs.stderr
+    columns = [np.genfromtxt(result.stdout.splitlines(), delimiter=",", skip_header=1) for result in (mine, theirs)]
+    assert np.allclose(*columns, equal_nan=True, rtol=1e-4, atol=1e-6)
+    assert kfgen("run", SPEC, "foreign.csv", "--columns", "none.yaml").exit_code == 2

@@ -1,4 +1,4 @@
-"""The specs in specs/, run as firmware would run them, over recorded logs where there are any."""
+"""The specs in specs/, run as firmware would run them, over recorded logs."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ import kfgen
 from kfgen.logs import Log, read
 from kfgen.native import NativeFilter
 from kfgen.simulate import simulate
+from tests.recorded import log_file
 
 ROOT = Path(__file__).parents[2]
-DATA = ROOT.parent / "shared" / "data"
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -41,12 +41,10 @@ def build() -> Callable[..., NativeFilter]:
 
 @pytest.fixture(scope="session")
 def recorded() -> Callable[[NativeFilter, str], Log]:
-    """A recorded log, read for a filter; skips the test where the folder of logs is not there."""
+    """A recorded log, read for a filter."""
 
     def find(kf: NativeFilter, name: str) -> Log:
-        if not DATA.is_dir():
-            pytest.skip("the recorded logs are not beside the repository")
-        return read(DATA / f"{name}.csv", kf.spec)
+        return read(log_file(name), kf.spec)
 
     return find
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ def log(kf, recorded):
 
 @pytest.fixture(scope="module")
 def charge(log):
-    with open(log.source, encoding="utf-8") as stream:
+    with gzip.open(log.source, "rt", encoding="utf-8") as stream:
         return 1 - np.array([float(row["net_discharged_Ah"]) for row in csv.DictReader(stream)]) / CAPACITY
 
 

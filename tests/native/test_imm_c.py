@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +17,7 @@ from kfgen.spec import loads
 from kfgen.status import ERROR, Status
 from tests.oracle.imm_banks import TURNING, bank
 from tests.oracle.problems import IMM3
-
-PEERS = Path(__file__).resolve().parents[3] / "shared" / "peers"
+from tests.recorded import peer_rows
 
 
 def pairs(texts: Mapping[str, str], scalar: str = "double") -> dict[str, Pair]:
@@ -46,10 +44,9 @@ MATCHES = [
 
 
 def peer(name: str) -> np.ndarray:
-    return np.loadtxt(PEERS / f"{name}.csv", delimiter=",", skiprows=1, ndmin=2)
+    return peer_rows(name)
 
 
-@pytest.mark.skipif(not PEERS.is_dir(), reason="no peers folder")
 def test_peers():
     """|dx| relative to max(|x|, 1e-3 of the largest |x_i| in the run), |dP_ij| to sqrt(P_ii P_jj), mu: 1e-8."""
     first, second, rest = IMM3.split("{type: ekf}")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from kfgen import logs
+from kfgen.columns import load_columns
 from kfgen.errors import KfgenError
 
 HEAD = "t,gyro,gnss.x,gnss.y,compass.heading\n"
@@ -46,7 +47,6 @@ def test_nan_is_an_empty_cell_and_inf_a_value(read):
         (HEAD, r"header but no rows"),
         ("t,gyro,gnss.x,gnss.y\n0,0,0,0\n", r"column `compass\.heading` is missing .*the log has: t, gyro"),
         (HEAD.replace("gyro", "giro") + "0,0,0,0,0\n", r"column `gyro` is missing; did you mean `giro`"),
-        (HEAD.replace(",", ";") + "0;0;0;0;0\n", r"separated by commas"),
         (HEAD.replace("gyro", "t") + "0,0,0,0,0\n", r"column `t` occurs twice"),
         (HEAD + "0,0,0,0,0\n1,0,abc,0,0\n", r"log\.csv:3: column `gnss\.x`: 'abc' is not a number"),
         (HEAD + "0,1_000,0,0,0\n", r"log\.csv:2: column `gyro`: '1_000' is not a number"),
@@ -131,3 +131,67 @@ def test_very_many_columns(read):
     assert "did you mean `gyr`?" in str(caught.value)
     assert len(logs.listed(log.ignored)) < 400
     assert time.perf_counter() - start < 5
+
+
+def test_semicolons_decimal_commas_and_na(read):
+    log = read(HEAD.replace(",", ";") + "0,5;1,25e-1;NA;3;N/A\n1;2;-,5;;null\n")
+    assert log.said == ("cells are taken to be separated by semicolons, numbers to have decimal commas",)
+    assert log.columns["t"].tolist() == [0.5, 1]
+    assert log.columns["gyro"].tolist() == [0.125, 2]
+    assert log.columns["gnss.x"][1] == -0.5
+    assert np.isnan(log.columns["compass.heading"]).all()
+    assert read(HEAD.replace(",", "\t") + "0\t0.5\t0\t0\t0\n").said == ("cells are taken to be separated by tabs",)
+    assert read(HEAD + "0,0,0,0,0\n").said == ()
+    with pytest.raises(KfgenError, match=r"log\.csv:2: column `gyro`: '1,2,3'"):
+        read(HEAD.replace(",", ";") + "0;1,2,3;0;0;0\n")
+
+
+def test_foreign_names_and_units(spec, tmp_path):
+    (tmp_path / "names.yaml").write_text(
+        "t: {from: time_ms, scale: 1e-3}\ngyro: rate\ngnss.x: {from: east, offset: -100}\n"
+        "compass.heading: {from: 'course deg', scale: 0.5}\n"
+    )
+    (tmp_path / "log.csv").write_text("time_ms,rate,east,gnss.y,course deg,gyro\n1500,2,103,4,90,7\n")
+    log = logs.read(tmp_path / "log.csv", spec, load_columns(tmp_path / "names.yaml"))
+    assert {name: column.tolist() for name, column in log.columns.items()} == {
+        "t": [1.5], "gyro": [2], "gnss.x": [3], "gnss.y": [4], "compass.heading": [45],
+    }  # fmt: skip
+    (tmp_path / "other.csv").write_text("time_ms,rate,gnss.y,course deg\n1500,2,4,90\n")
+    with pytest.raises(KfgenError, match=r"column `east`, which `gnss.x` is to come from, is missing"):
+        logs.read(tmp_path / "other.csv", spec, load_columns(tmp_path / "names.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("- t\n", "columns are a mapping"),
+        ("t: {form: x}\n", "unknown key `form`; did you mean `from`"),
+        ("t: {from: x, scale: ms}\n", "t.scale: `scale` is a number, not text"),
+        ("t: [x]\n", "a column comes from another, not from a list"),
+        ("t: {from: ''}\n", "`from` names a column"),
+    ],
+)
+def test_mistakes_in_foreign_names(tmp_path, text, said):
+    (tmp_path / "names.yaml").write_text(text)
+    with pytest.raises(KfgenError, match=said):
+        load_columns(tmp_path / "names.yaml")
+
+
+def test_parquet(spec, tmp_path):
+    import pyarrow
+    from pyarrow import parquet
+
+    columns = {"t": [0, 1], "gyro": [0.5, 1.5], "gnss.x": [None, 2.0], "gnss.y": [1.0, 2.0], "compass.heading": [0, 1]}
+    parquet.write_table(pyarrow.table({**columns, "note": ["a", "b"]}), tmp_path / "log.parquet")
+    log = logs.read(tmp_path / "log.parquet", spec)
+    assert np.isnan(log.columns["gnss.x"][0])
+    assert log.columns["compass.heading"].tolist() == [0, 1]
+    assert log.ignored == ("note",)
+    parquet.write_table(pyarrow.table({**columns, "gyro": ["a", "b"]}), tmp_path / "log.parquet")
+    with pytest.raises(KfgenError, match="column `gyro` does not hold numbers"):
+        logs.read(tmp_path / "log.parquet", spec)
+    (tmp_path / "no.parquet").write_bytes(b"PAR1")
+    with pytest.raises(KfgenError, match="not a Parquet file"):
+        logs.read(tmp_path / "no.parquet", spec)
+    with pytest.raises(FileNotFoundError):
+        logs.read(tmp_path / "none.parquet", spec)

@@ -6,8 +6,6 @@ than they were measured to be: each bound is written beside what was found, with
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from emitted import ALL, FORMS, locked, problems
@@ -19,8 +17,8 @@ from kfgen.reference import reference
 from kfgen.simulate import simulate
 from kfgen.spec import loads
 from kfgen.status import ERROR
+from tests.recorded import peer_rows
 
-PEERS = Path(__file__).resolve().parents[3] / "shared" / "peers"
 PEER_FILES = {
     "filterpy_cv4_ekf": "cv4",
     "yafl_cv4_bierman": "cv4",
@@ -43,10 +41,9 @@ def built(texts: dict[str, str], scalar: str, flags: tuple[str, ...] = ("-O2",))
 
 
 def read(name: str) -> np.ndarray:
-    return np.loadtxt(PEERS / f"{name}.csv", delimiter=",", skiprows=1, ndmin=2)
+    return peer_rows(name)
 
 
-@pytest.mark.skipif(not PEERS.is_dir(), reason="no peers folder")
 def test_peers():
     """|dx| relative to max(|x|, 1e-3 of the largest |x_i| in the run), |dP_ij| to sqrt(P_ii P_jj): 1e-9."""
     filters = built({name: problems.ALL[name] for name in ("cv4", "cv4_outliers", "vehicle4")}, "double")

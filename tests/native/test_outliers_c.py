@@ -5,17 +5,13 @@ A difference in one form is that layout's; in all of them, the influence functio
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from emitted import problems
 from variants import FORMS, built, spec_with
 
 from kfgen.status import Status
-
-PEERS = Path(__file__).resolve().parents[3] / "shared" / "peers"
-pytestmark = pytest.mark.skipif(not PEERS.is_dir(), reason="no peers folder")
+from tests.recorded import peer_rows
 
 SMALL, LARGE, ANOMALY = Status.GLITCH_SMALL, Status.GLITCH_LARGE, Status.ANOMALY
 # options -> problem, the files that have to be met, the flags that the run raises, the forms
@@ -35,7 +31,7 @@ RUNS = {
 
 
 def read(name: str) -> np.ndarray:
-    return np.loadtxt(PEERS / f"{name}.csv", delimiter=",", skiprows=1, ndmin=2)
+    return peer_rows(name)
 
 
 @pytest.mark.parametrize("options", RUNS)

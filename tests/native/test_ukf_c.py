@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,10 +35,10 @@ from variants import TURN, built, call
 from kfgen.native import NativeFilter
 from kfgen.reference import reference
 from kfgen.status import ERROR, Status, describe
+from tests.recorded import peer_rows
 
 OK, GATED, ANOMALY = Status.OK, Status.GATED, Status.ANOMALY
 REJECTED, REGULARIZED = Status.POINT_REJECTED, Status.REGULARIZED
-PEERS = Path(__file__).resolve().parents[3] / "shared" / "peers"
 RADAR = problems.RADAR.replace("probability: 0.9999", "probability: 0.99, reset_after: 1")
 
 
@@ -227,7 +226,7 @@ def test_bearings_cross_pi():
 
 
 def peer(name: str) -> np.ndarray:
-    return np.loadtxt(PEERS / f"{name}.csv", delimiter=",", skiprows=1, ndmin=2)
+    return peer_rows(name)
 
 
 MERWE = KINDS["merwe-0.1"]
@@ -244,7 +243,6 @@ RESULTS = [
 ]
 
 
-@pytest.mark.skipif(not PEERS.is_dir(), reason="no peers folder")
 def test_other_implementations():
     """|dx| relative to max(|x|, 1e-3 of the largest |x_i| in the run), |dP_ij| to sqrt(P_ii P_jj): 1e-8."""
     filters = built({key: unscented(problems.VEHICLE4, *key[:2]) for key in RESULTS})

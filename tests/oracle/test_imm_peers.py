@@ -8,7 +8,7 @@ from filterpy.kalman import IMMEstimator, KalmanFilter
 from imm_banks import build
 from problems import IMM3
 from test_filterpy import random_covariance, rows
-from test_peers import PEERS, read
+from test_peers import read
 
 
 def imm3(cv: str, ca: str) -> str:
@@ -21,7 +21,6 @@ BIERMAN, UKF = "type: ekf", "type: ukf, covariance: ud, sequential: false"
 KAPPA0 = "sigma_points: {kind: julier, kappa: 0, redraw: false}"
 
 
-@pytest.mark.skipif(not PEERS.is_dir(), reason="no peers folder")
 @pytest.mark.parametrize(
     ("cv", "ca", "peer"),
     [

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from problems import CV4, CV4_OUTLIERS, VEHICLE4
 
 from kfgen.reference import Status, reference
 from kfgen.spec import loads
-
-PEERS = Path(__file__).resolve().parents[3] / "shared" / "peers"
-pytestmark = pytest.mark.skipif(not PEERS.is_dir(), reason="no peers folder")
+from tests.recorded import peer_rows
 
 FORMS = ["ud, update: bierman", "ud, update: joseph", "full", "full, update: standard", "sqrt"]
 PLAIN = [
@@ -35,7 +31,7 @@ OUTLIERS = [
 
 
 def read(name: str) -> np.ndarray:
-    return np.loadtxt(PEERS / f"{name}.csv", delimiter=",", skiprows=1, ndmin=2)
+    return peer_rows(name)
 
 
 def compare(text: str, problem: str, *peers: str) -> set[int]:

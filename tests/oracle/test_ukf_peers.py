@@ -11,7 +11,7 @@ from filterpy.kalman import (
     UnscentedKalmanFilter,
 )
 from problems import RADAR, VEHICLE4, chain
-from test_peers import PEERS, read
+from test_peers import read
 
 from kfgen.reference import reference
 from kfgen.reference.model import wrap
@@ -20,7 +20,6 @@ from kfgen.spec import loads
 MERWE = "sigma_points: {kind: merwe, alpha: 0.1, beta: 2, kappa: 1"
 
 
-@pytest.mark.skipif(not PEERS.is_dir(), reason="no peers folder")
 @pytest.mark.parametrize(
     ("options", "peer"),
     [

@@ -32,7 +32,9 @@ ALLOWED = {
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
     "excursions": {"errors", "spec"},
-    "logs": SPEC | {"files"},
+    "cells": {"errors"},
+    "columns": SPEC,
+    "logs": SPEC | {"cells", "columns", "files"},
     "late": SPEC | {"logs"},
     "reference": {"errors", "spec"},
     # from a spec to C
@@ -50,7 +52,13 @@ ALLOWED = {
     # the compiled filter, and what uses it
     "simulate": SPEC | {"geometry", "logs", "reference"},
     "native": SPEC | {"emit", "files", "generate", "late", "logs", "override", "status"},
+    "smoothing": SPEC | {"logs", "native", "reference"},
+    "statistics": set(),
+    "tuning": SPEC | {"geometry", "logs", "native", "reference", "statistics", "status"},
     "plot": SPEC | {"files", "logs", "native"},
+    "report": SPEC
+    | {"cost", "generate", "geometry", "logs", "model", "native", "plot", "reference", "simulate", "smoothing"}
+    | {"statistics", "status"},
     "check": SPEC
     | {"advice", "excursions", "generate", "geometry", "interface", "native", "override", "reference", "simulate"}
     | {"status"},
@@ -62,10 +70,11 @@ ALLOWED = {
     "difference": SPEC | {"generate", "geometry", "logs", "native"},
     "tools": {"__init__", "errors", "native"},
     "commands": SPEC
-    | {"advice", "check", "cost", "difference", "examples", "excursions", "files", "generate", "late", "layouts"}
-    | {"logs", "native", "override", "plot", "reference", "seal", "selftest", "simulate", "status", "tools"},
+    | {"advice", "check", "columns", "cost", "difference", "examples", "excursions", "files", "generate", "late"}
+    | {"layouts", "logs", "native", "override", "plot", "reference", "report", "seal", "selftest", "simulate"}
+    | {"smoothing", "status", "tools", "tuning"},
     "cli": {"commands", "errors"},
-    "__init__": SPEC | {"generate", "native", "reference", "status"},
+    "__init__": SPEC | {"generate", "native", "reference", "report", "status", "tuning"},
     "__main__": {"cli"},
 }
 """Part of kfgen -> the other parts it may import; `kfgen` itself (its version, a lazy name) is looked through."""
@@ -75,6 +84,8 @@ FLOORS = {
                 "build"],
     "filters.covariance": ["names", "noise", "kept", "parts", "base", "motion", "definite", "kernels", "gather",
                            "loops", "straight", "forms", "ud", "full", "sqrt"],
+    "report": ["blocks", "walk", "observability", "equations", "figures", "subject", "sections", "page"],
+    "tuning": ["numbers", "opened", "writing", "objective", "search", "curvature"],
     "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "build"],
 }  # fmt: skip
 """Part or room -> its files and rooms, the lowest first: each imports only what stands before it."""

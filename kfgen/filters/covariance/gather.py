@@ -33,9 +33,7 @@ class GatheredEntries:
         self.common = how.common
         self.outside: list[tuple[Vector, Weight]] = list(columns)
         self.Q = Q.entries()
-        self.sums = {
-            (i, j): t.variable(f"sum_{names[i]}_{names[j]}", 0) for j in range(self.n) for i in range(j + 1)
-        }
+        self.sums = {(i, j): t.variable(f"sum_{names[i]}_{names[j]}", 0) for j in range(self.n) for i in range(j + 1)}
         self.depth = t.depth
 
     def add_row(self, array: Array, at: Value, d: Vector, weight: Weight) -> None:

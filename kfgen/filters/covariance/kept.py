@@ -61,6 +61,7 @@ class Kept:
 
     def get(self, t: Trace, i: Value, j: Value) -> Value:
         """An entry for counters i <= j."""
+
         def at(row: Value, col: Value) -> Value:
             place = upper_start(col) + row
             return t.element(f"kf.{self.field}", place)

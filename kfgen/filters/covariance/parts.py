@@ -169,7 +169,11 @@ class Mixer(Protocol):
     """Mixes covariances of its form in loops over the fields that hold them."""
 
     def mixture(
-        self, t: Trace, own: Part, others: list[Part], spread: list[tuple[Array, Number]],
+        self,
+        t: Trace,
+        own: Part,
+        others: list[Part],
+        spread: list[tuple[Array, Number]],
         place: Callable[[Value], Value],
     ) -> dict[str, Array]:
         """Local arrays that hold sum w_i P_i + sum v_k d_k d_k^T as the fields of the struct would, by their paths.

@@ -91,9 +91,7 @@ class SingleFilter(ABC):
             if adapted is not None:
                 doc = f"The covariance of {sensor.name} as it has been adapted."
                 name = f"R_{sensor.name}"
-                functions.append(
-                    get_matrix(name, "R", adapted.m, adapted.kept.get, lambda t: lambda i: i, doc, taken)
-                )
+                functions.append(get_matrix(name, "R", adapted.m, adapted.kept.get, lambda t: lambda i: i, doc, taken))
         if self.Q is not None:
             functions.append(self.covariance.get_noise(self.Q.kept, taken))
         functions += self.further_functions(taken)

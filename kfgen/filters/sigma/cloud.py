@@ -284,4 +284,3 @@ def carried_by(model: Model, duals: list[Dual], names: list[str], covariance: tu
 def symbolic_noises(t: Trace, names: list[str]) -> dict[str, Dual]:
     """Noise inputs as values of their own, for `carried_by`."""
     return {name: Dual(t.field(f"w.{name}"), {name: t.one}) for name in names}
-

@@ -38,9 +38,7 @@ class Drawing:
         root = self.form.root(t, P, self.tolerance, stored, self.in_loops)
         return self._written(t, root, noise, points, array)
 
-    def _written(
-        self, t: Trace, root: Array | Columns, noise: Rows, points: PointSet, array: Array
-    ) -> list[Value]:
+    def _written(self, t: Trace, root: Array | Columns, noise: Rows, points: PointSet, array: Array) -> list[Value]:
         if isinstance(root, Columns):
             fill(t, array, points, self._columns(t, root, noise))
             return root.failures
@@ -50,9 +48,7 @@ class Drawing:
             _combine(t, array, points, root, self.form.n)
         return []
 
-    def around(
-        self, t: Trace, P: Any, noise: Rows, points: PointSet, array: Array, x: list[Value]
-    ) -> list[Value]:
+    def around(self, t: Trace, P: Any, noise: Rows, points: PointSet, array: Array, x: list[Value]) -> list[Value]:
         """Write points about x (n,), of the P of the struct; conditions of failure."""
         n, stride = self.form.n, self.form.n + len(noise)
         root = self.form.root(t, P, self.tolerance, True, self.in_loops)

@@ -38,9 +38,7 @@ from kfgen.model.model import SensorModel
 from kfgen.quantiles import log_two_pi
 
 
-def whole_vector(
-    ukf: Ekf, seeing: Seeing, t: Trace, sensor: SensorModel, used: list[Value] | None
-) -> Phases:
+def whole_vector(ukf: Ekf, seeing: Seeing, t: Trace, sensor: SensorModel, used: list[Value] | None) -> Phases:
     """The update of a sensor by the whole vector."""
     model, form = ukf.model, ukf.form
     t.section("innovation")
@@ -191,9 +189,7 @@ class _Whole:
                     size = size + u.t.function("abs", reach)
         return size * size * (sum(abs(w) for w in points.wc) * (32 * epsilon) ** 2)
 
-    def inflated(
-        self, seen: Seen, first: Factored, array: Array | None, out: Array | None
-    ) -> tuple[Any, Factored]:
+    def inflated(self, seen: Seen, first: Factored, array: Array | None, out: Array | None) -> tuple[Any, Factored]:
         """P <- (1 + a) P where the innovation fails its test, and all that follows from it."""
         t, u, seeing = self.u.t, self.u, self.seeing
         inflation = self.ukf.model.options.inflation

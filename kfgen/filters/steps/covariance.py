@@ -133,8 +133,13 @@ def covariance_argument(n: int) -> Argument:
 
 
 def get_matrix(
-    name: str, argument: str, n: int, entry: Callable[[Trace, Value, Value], Value],
-    place: Callable[[Trace], Callable[[Value], Value]], doc: str, taken: frozenset[str],
+    name: str,
+    argument: str,
+    n: int,
+    entry: Callable[[Trace, Value, Value], Value],
+    place: Callable[[Trace], Callable[[Value], Value]],
+    doc: str,
+    taken: frozenset[str],
 ) -> Function:
     """A getter of a symmetric matrix (n, n), row-major. entry: for counters i <= j; place: where a row goes."""
     t = Trace()
@@ -144,6 +149,4 @@ def get_matrix(
         t.store(argument, at(i) * n + at(j), value)
         t.store(argument, at(j) * n + at(i), value)
     out = Argument(argument, "{name}_real_t", pointer=True, constant=False, size=n * n, doc=f"{name}, row-major")
-    return Function(
-        f"get_{name}", [CONST_KF, out], schedule(t, taken | {"x", argument}), doc, returns="void"
-    )
+    return Function(f"get_{name}", [CONST_KF, out], schedule(t, taken | {"x", argument}), doc, returns="void")

@@ -17,9 +17,7 @@ from kfgen.model.model import SensorModel
 from kfgen.quantiles import chi2_quantile
 
 
-def gate(
-    t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], used: list[Value] | None
-) -> None:
+def gate(t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], used: list[Value] | None) -> None:
     """End the update where nis is beyond the gate; after reset_after rejections take it all the same.
 
     A bank has the sensor and nis of each of its modes, and refuses what all of them refuse. used: whether each
@@ -71,7 +69,11 @@ def smallest(t: Trace, values: list[Value]) -> Value:
 
 
 def store_outcome(
-    t: Trace, model: Model, sensors: list[SensorModel], nis: list[Value], log_likelihood: Value,
+    t: Trace,
+    model: Model,
+    sensors: list[SensorModel],
+    nis: list[Value],
+    log_likelihood: Value,
     fields: Sequence[str] = (),
 ) -> None:
     """What an accepted update leaves beside the estimate. fields: where a bank keeps the nis of each of its modes."""

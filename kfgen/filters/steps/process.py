@@ -133,7 +133,12 @@ def given(t: Trace, model: Model, step: Step) -> Prior:
 
 
 def advance(
-    t: Trace, model: Model, prior: Prior, step: Step, additive: Rows | None = None, derivatives: int = 1,
+    t: Trace,
+    model: Model,
+    prior: Prior,
+    step: Step,
+    additive: Rows | None = None,
+    derivatives: int = 1,
     carried: tuple[str, ...] = (),
 ) -> Advance:
     """One step of the model from the prior. additive: what stands for the Q of the spec (n, n).

@@ -51,9 +51,7 @@ class Sequence(Generic[P]):
     plain: the textbook's, without robust, adaptive and changed gains.
     """
 
-    def __init__(
-        self, t: Trace, model: Model, form: Form[P], names: list[str], plain: bool, epsilon: Fraction
-    ) -> None:
+    def __init__(self, t: Trace, model: Model, form: Form[P], names: list[str], plain: bool, epsilon: Fraction) -> None:
         self.t = t
         self.epsilon = epsilon
         self.model = model

@@ -84,6 +84,7 @@ class Expressions(Functions):
         """Its integers, for arguments with that exponent; a table has one format of its abscissae."""
         found = self.c.tables.get(table)
         if found is None:
+
             def least(values: tuple[Fraction, ...]) -> int:
                 return max((size_of(v) for v in values if v), default=0) - BITS + 1
 

@@ -109,7 +109,7 @@ class ExpressionSource:
             return f"({args[0]} // 2)"
         if node.op == "neg":
             return f"(-{args[0]})"
-        return f"({args[0]} { {'add': '+', 'sub': '-', 'mul': '*'}[node.op]} {args[1]})"
+        return f"({args[0]} { {'add': '+', 'sub': '-', 'mul': '*'}[node.op] } {args[1]})"
 
     def shortcut(self, node: Node) -> str:
         self.count += 1

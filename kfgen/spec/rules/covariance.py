@@ -189,9 +189,7 @@ def _probe(facts: Facts, pair: tuple[Expression, Expression], context: Context, 
     return [facts.tree(entry.tree, point) for entry in pair]
 
 
-def _semidefinite(
-    facts: Facts, rows: list[list[Value]], names: list[str], place: Place, what: str, hint: str
-) -> None:
+def _semidefinite(facts: Facts, rows: list[list[Value]], names: list[str], place: Place, what: str, hint: str) -> None:
     if is_semidefinite(rows):
         return
     smallest = smallest_eigenvalue(rows)

@@ -202,9 +202,7 @@ def _measurement_noise(sensor: Sensor) -> list[Expression]:
     return found + _entries(sensor.R) + _entries(sensor.noise_covariance)
 
 
-def _constant(
-    facts: Facts, model: Model, entries: list[Expression], key: str, what: str, allowed: str = ""
-) -> None:
+def _constant(facts: Facts, model: Model, entries: list[Expression], key: str, what: str, allowed: str = "") -> None:
     """One mistake per matrix, at the first entry that varies. allowed: a kind of name that may."""
     for entry in entries:
         uses = frozenset(name for name in model.context.uses(entry) if model.context.kinds.get(name, name) != allowed)

@@ -106,7 +106,6 @@ def add_noise(t: Trace, a: Array, Q: Rows, noise: list[tuple[Vector, Value]], sq
             a[at] = a[at] + value
 
 
-
 def _kept(Q: Rows) -> str:
     """The field that holds all of Q, packed as P is; empty: none."""
     node = Q[0][0].node if isinstance(Q[0][0], Value) else None

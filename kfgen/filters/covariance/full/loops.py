@@ -116,9 +116,7 @@ class LoopedFull(Looped, FullStore):
             return self.root_array(t, tolerance, left)
         return self.root_array(t, tolerance, Array(t, P.written().array))
 
-    def gatherer(
-        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
-    ) -> LoopedEntries:
+    def gatherer(self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering) -> LoopedEntries:
         return LoopedEntries(t, self.kernels, Q, noise, how)
 
     def downdated(

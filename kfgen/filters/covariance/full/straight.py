@@ -224,9 +224,7 @@ class StraightFull(StraightLine, FullStore):
         S, failures = cholesky(lambda i, j: P[i, j], self.n, tolerance)
         return Columns([[S[i][j] for i in range(self.n)] for j in range(self.n)], failures)
 
-    def gatherer(
-        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
-    ) -> Gatherer[Symmetric]:
+    def gatherer(self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering) -> Gatherer[Symmetric]:
         return EntriesInLoops(t, Q, noise, how) if how.in_loops else GatheredEntries(t, Q, noise, how)
 
     def downdated(

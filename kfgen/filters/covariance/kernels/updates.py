@@ -158,8 +158,11 @@ def bierman(kernels: Kernels, n: int, single: bool, sure: bool, weighted: bool, 
     arguments += [number_argument("r")] + [number_argument("weight")] * weighted
     arguments += [number_argument("nu"), array_argument("moved", n)] if moves else [array_argument("gain", n)]
     arguments.append(array_argument("s", 2))
-    doc = "Bierman's update by a measurement of h times one state, of variance r" if single else \
-          "Bierman's update by a measurement of h x, of variance r; h is zero before `first` and after `last`"
+    doc = (
+        "Bierman's update by a measurement of h times one state, of variance r"
+        if single
+        else "Bierman's update by a measurement of h x, of variance r; h is zero before `first` and after `last`"
+    )
     doc += ". s: its innovation variance" + (", and nu^2 over it; moved += gain nu" if moves else "")
     name = "measure" + "_state" * single + "_gain" * (not moves) + "_any" * (not sure)
     return kernels.function(name, arguments, doc, body)

@@ -54,8 +54,15 @@ class Absorber:
         for c in range(0, len(noise), 2):
             self.absorb_columns(space, sure, noise[c : c + 2])
         t.section(title)
-        self._all_columns(space, sure, [row[0] for row in F], column_of, weight,
-                          lambda start: self._transition(t, F, w, start), lambda pair: self._reach(t, F, pair))
+        self._all_columns(
+            space,
+            sure,
+            [row[0] for row in F],
+            column_of,
+            weight,
+            lambda start: self._transition(t, F, w, start),
+            lambda pair: self._reach(t, F, pair),
+        )
 
     def add(
         self, space: Space, column_of: Callable[[Value, Put], None], weight: Callable[[int | Value], Value]
@@ -150,9 +157,7 @@ class Absorber:
                 t.store(field, upper_start(j) + i, U[strict_start(j) + i])
             t.store(field, upper_start(j) + j, D[j])
 
-    def add_spread(
-        self, space: Space, spread: list[tuple[Array, Number]], place: Callable[[Value], Value]
-    ) -> None:
+    def add_spread(self, space: Space, spread: list[tuple[Array, Number]], place: Callable[[Value], Value]) -> None:
         """+ sum of v d d^T over some (d, v), d (n,) in the spec's order, two at a time."""
         t, n, w = space.t, self.n, self.columns(space)
         for c in range(0, len(spread), 2):

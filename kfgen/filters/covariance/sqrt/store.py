@@ -42,7 +42,6 @@ class SqrtStore(Definite):
         """Position of S_ij for counters i <= j."""
         return upper_start((self.n - 1) - i) + ((self.n - 1) - j)
 
-
     def spot(self, t: Trace, i: int | Value, j: int | Value) -> int | Value:
         """Where S_ij stands in kf.S, i <= j."""
         if isinstance(i, int) and isinstance(j, int):

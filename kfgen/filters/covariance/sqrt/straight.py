@@ -90,9 +90,7 @@ class StraightSqrt(StraightLine, SqrtStore):
         # in the order of the spec's lower factor: its first column is the inner order's last
         return Columns(columns_of(P)[::-1], [])
 
-    def gatherer(
-        self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering
-    ) -> Gatherer[Rows]:
+    def gatherer(self, t: Trace, Q: Additive, noise: list[tuple[Vector, Value]], how: Gathering) -> Gatherer[Rows]:
         def finish(U: Rows, D: Vector) -> Rows:
             return self.from_factors(t, U, D)
 
@@ -104,9 +102,7 @@ class StraightSqrt(StraightLine, SqrtStore):
         """Never: it is a square."""
         return P, []
 
-    def downdated(
-        self, t: Trace, P: Rows, c: Vector, s: Number, how: Removal, prior: Rows
-    ) -> tuple[Rows, Value]:
+    def downdated(self, t: Trace, P: Rows, c: Vector, s: Number, how: Removal, prior: Rows) -> tuple[Rows, Value]:
         """S S^T - w w^T, w = c / sqrt(s), by the downdate of van der Merwe & Wan 2001 (Golub & Van Loan 6.5.4).
 
         r^2 = S_jj^2 - w_j^2, S_ij <- (S_ij - w_j w_i / S_jj) S_jj / r, w_i <- (r w_i - w_j S_ij) / S_jj with the new
@@ -143,9 +139,7 @@ class StraightSqrt(StraightLine, SqrtStore):
                 S[i][j] = select(gone, 0, new)
         return S, failed
 
-    def update(
-        self, t: Trace, P: Rows, measurements: list[Scalar], motion: Motion
-    ) -> tuple[Rows, list[VectorGain]]:
+    def update(self, t: Trace, P: Rows, measurements: list[Scalar], motion: Motion) -> tuple[Rows, list[VectorGain]]:
         S = [list(row) for row in P]
         gains = []
         for scalar in measurements:

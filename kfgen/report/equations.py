@@ -1,0 +1,110 @@
+"""Formulas of a spec as MathML, by SymPy's printer, with their names, constants too, as they are written."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import sympy
+from sympy.printing.mathml import MathMLPresentationPrinter
+
+from kfgen.model.functions import KfFunction
+from kfgen.spec.tree import Call, Expression, Name, Number, Tree
+
+_ENTITIES = {"&InvisibleTimes;": "&#x22C5;", "&ExponentialE;": "e", "&ImaginaryI;": "i"}
+
+
+class Cases(KfFunction):
+    """where(condition, a, b)."""
+
+
+def _cases(printer: Any, expression: Any) -> Any:
+    """Cases as cases, a line each."""
+    condition, yes, no = expression.args
+    dom = printer.dom
+
+    def element(tag: str, *children: Any) -> Any:
+        made = dom.createElement(tag)
+        for child in children:
+            made.appendChild(child)
+        return made
+
+    lines = [(printer._print(yes), printer._print(condition)), (printer._print(no), element("mtext"))]
+    lines[1][1].appendChild(dom.createTextNode("otherwise"))
+    rows = [element("mtr", *(element("mtd", cell) for cell in line)) for line in lines]
+    return element("mrow", element("mo", dom.createTextNode("{")), element("mtable", *rows))
+
+
+def mathml(expression: Expression | Tree) -> str:
+    """The MathML of a formula, without the tag around it."""
+    tree = expression.tree if isinstance(expression, Expression) else expression
+    return printed(symbolic(tree))
+
+
+def printed(expression: Any) -> str:
+    printer = MathMLPresentationPrinter()
+    printer._print_Cases = partial(_cases, printer)
+    text: str = printer.doprint(expression)
+    text = text.replace("<mo><</mo>", "<mo>&lt;</mo>").replace("<mo>></mo>", "<mo>&gt;</mo>")
+    text = re.sub(r"<mo>([()])</mo>", r'<mo stretchy="false">\1</mo>', text)
+    for name, plain in _ENTITIES.items():
+        text = text.replace(name, plain)
+    return text
+
+
+def equation(left: str, expression: Expression | Tree) -> str:
+    """A row `left = formula`; left is MathML."""
+    return f"{left}<mo>=</mo><mrow>{mathml(expression)}</mrow>"
+
+
+def name(text: str, suffix: str = "") -> str:
+    """A name, with an index where it has an underscore, and a suffix as a further index."""
+    return (
+        printed(sympy.Symbol(text))
+        if not suffix
+        else f"<msub><mrow>{printed(sympy.Symbol(text))}</mrow>{suffix}</msub>"
+    )
+
+
+def word(text: str) -> str:
+    return f"<mtext>{html.escape(text)}</mtext>"
+
+
+def symbolic(tree: Tree) -> Any:
+    """A tree as a SymPy expression of its own names; numbers stay as they are written."""
+    if isinstance(tree, Number):
+        if tree.value.denominator == 1 and abs(tree.value) < 10**6:
+            return sympy.Integer(tree.value.numerator)
+        return sympy.Float(repr(float(tree.value)), 15)
+    if isinstance(tree, Name):
+        return sympy.pi if tree.name == "pi" else sympy.Symbol(tree.name)
+    assert isinstance(tree, Call)
+    if tree.op == "table":
+        return sympy.Function("table")(symbolic(tree.args[0]))
+    return _CALLS[tree.op](*[symbolic(argument) for argument in tree.args])
+
+
+def _named(text: str) -> Callable[..., Any]:
+    return lambda *arguments: sympy.Function(text)(*arguments)
+
+
+_CALLS: dict[str, Callable[..., Any]] = {
+    "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
+    "pow": lambda a, b: a**b, "neg": lambda a: -a,
+    "lt": lambda a, b: sympy.Lt(a, b, evaluate=False), "le": lambda a, b: sympy.Le(a, b, evaluate=False),
+    "gt": lambda a, b: sympy.Gt(a, b, evaluate=False), "ge": lambda a, b: sympy.Ge(a, b, evaluate=False),
+    "and": lambda a, b: sympy.And(a, b, evaluate=False), "or": lambda a, b: sympy.Or(a, b, evaluate=False),
+    "not": lambda a: sympy.Not(a, evaluate=False),
+    "sqrt": sympy.sqrt, "hypot": lambda a, b: sympy.sqrt(a**2 + b**2), "abs": sympy.Abs, "floor": sympy.floor,
+    "exp": sympy.exp, "log": sympy.log, "where": Cases,
+    **{op: getattr(sympy, op) for op in ("sin", "cos", "tan", "sinh", "cosh", "tanh")},
+    **{op: _named(op) for op in ("asin", "acos", "atan", "atan2", "sign", "min", "max")},
+}  # fmt: skip
+
+
+def plain(text: str) -> str:
+    """A formula's text on one line."""
+    return re.sub(r"\s+", " ", text).strip()
