@@ -59,8 +59,8 @@ def _signature(name: str, history: bool) -> str:
     return (
         f"void {name}_kfgen_run({whole}, size_t rows, const uint8_t *step, const {real} *dt, "
         f"const {real} *u, const uint32_t *mask, const uint32_t *age, const {real} *z, {real} *x, {real} *rest, "
-        f"{real} *var, {real} *cov, {real} *nis, {real} *ll, {real} *mu, {real} *out, {real} *deviation, uint8_t *told, "
-        f"uint32_t *status)"
+        f"{real} *var, {real} *cov, {real} *nis, {real} *ll, {real} *mu, {real} *out, {real} *deviation, "
+        f"uint8_t *told, uint32_t *status)"
     )
 
 

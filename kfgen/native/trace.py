@@ -56,7 +56,7 @@ def trace(kf: NativeFilter, log: Log, progress: Callable[[int, int], None] | Non
     mask = np.zeros((len(row), len(spec.measurements)), np.uint32)
     updates = np.flatnonzero(call)
     mask[updates, call[updates] - 1] = work.mask[row[updates], call[updates] - 1]
-    calls = Plan(work.t[row], step, work.dt[row], work.u[row], mask, work.z[row])
+    calls = Plan(work.t[row], step, work.dt[row], work.u[row], mask, work.z[row], work.age[row])
     x0, P0 = kf.x, kf.P
     done = follow(kf.struct, spec, calls, progress, whole=True)
     assert done.P is not None

@@ -1,7 +1,7 @@
 """The fixed-interval smoother: a filter forwards over a log, then back over its predictions.
 
 Rauch, Tung & Striebel 1965; for sigma points Sarkka 2008, equations 28 to 35 (the unscented Rauch-Tung-Striebel
-smoother). Both are the same recursion: they differ in the covariance of the state before a prediction with that after.
+smoother). Both are the same recursion: they differ in the covariance of the state before a prediction with that after. Rotations: in the tangent space, at each end as it is seen from there.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.filter import ReferenceFilter
 from kfgen.reference.linalg import EPS, symmetric
 from kfgen.reference.log import Run, replay
-from kfgen.reference.model import Model
+from kfgen.reference.model import Model, wrap
 from kfgen.reference.sensor import SensorModel
 from kfgen.reference.status import Status
 from kfgen.spec.sensors import filter_of
@@ -30,7 +30,7 @@ from kfgen.spec.types import Spec
 class Smoothed:
     """Estimates that know all of a log of r rows.
 
-    x (r, n), P (r, n, n): after each row, in the spec's order; rows between which nothing was predicted share one.
+    x (r, nx), P (r, n, n): after each row, in the spec's order; rows between which nothing was predicted share one.
     run: the filter's own course.
     """
 
@@ -83,10 +83,19 @@ class _Forward:
             self.passages.append(passage)
         return status
 
+    @property
+    def outputs(self) -> dict[str, float]:
+        return self.kf.outputs
+
+    @property
+    def output_std(self) -> dict[str, float]:
+        return self.kf.output_std
+
     def update(
-        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None
-    ) -> int:
-        return self.kf.update(sensor, z, u, mask)
+        self, sensor: str, z: ArrayLike, u: ArrayLike | None = None, mask: int | Sequence[bool] | None = None,
+        inputs: ArrayLike | Mapping[str, float] | None = None,
+    ) -> int:  # fmt: skip
+        return self.kf.update(sensor, z, u, mask, inputs)
 
 
 def refusals(spec: Spec) -> Iterator[str]:
@@ -132,18 +141,25 @@ def smooth(spec: Spec, log: Mapping[str, ArrayLike], seen: Callable[[int], None]
 
 
 def _backward(model: Model, forward: _Forward, x: Vector, P: Matrix) -> tuple[Matrix, NDArray[np.float64]]:
-    """Estimates (k + 1, n), (k + 1, n, n) before each of k predictions and, x (n) and P (n, n), at the end.
+    """Estimates (k + 1, nx), (k + 1, n, n) before each of k predictions and, x (nx) and P (n, n), at the end.
 
-    G = C P_pred^-1, x_s <- x + G (x_s - x_pred), P_s <- P + G (P_s - P_pred) G^T.
+    G = C P_pred^-1, d = G (x_s [-] x_pred), x_s <- x [+] d, P_s <- P + G (P_s - P_pred) G^T. Of rotations P_s is moved
+    first to where the difference is taken, and last to where d leads.
     """
+    space = model.space
     steps = len(forward.passages)
-    xs, Ps = np.empty((steps + 1, len(x))), np.empty((steps + 1, len(x), len(x)))
+    xs, Ps = np.empty((steps + 1, len(x))), np.empty((steps + 1, len(P), len(P)))
     xs[-1], Ps[-1] = x, P
     for k in range(steps - 1, -1, -1):
         passage, (before, spread) = forward.passages[k], forward.before[k]
         G = passage.cross @ inverse(passage.P)
-        xs[k] = model.wrap(before + G @ model.wrap(xs[k + 1] - passage.x))
-        Ps[k] = symmetric(spread + G @ (Ps[k + 1] - passage.P) @ G.T)
+        ahead = space.difference(xs[k + 1], passage.x)
+        for i, period in model.turns.items():
+            ahead[i] = wrap(float(ahead[i]), period)
+        J, d = space.transport(xs[k + 1], passage.x), G @ ahead
+        T = space.turned(d)
+        xs[k] = model.wrap(space.moved(before, d))
+        Ps[k] = symmetric(T @ (spread + G @ (J @ Ps[k + 1] @ J.T - passage.P) @ G.T) @ T.T)
     return xs, Ps
 
 

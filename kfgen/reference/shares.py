@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from kfgen.reference.dual import Matrix, Vector, jacobian, variables
+from kfgen.reference.dual import Matrix, Vector, jacobian, values
 from kfgen.reference.linalg import udu
+from kfgen.reference.manifold import at_zero
 from kfgen.reference.model import Context
 from kfgen.reference.process import Process
 
 
 def sources(process: Process) -> tuple[str, ...]:
-    """What may add to the covariance in a step: each noise input, and the additive noise of each state."""
+    """What may add to the covariance in a step: each noise input, and the additive noise of each error."""
     spec = process.model.spec
-    return (*(f"noise.{noise.name}" for noise in spec.noise), *(f"Q.{state.name}" for state in spec.states))
+    return (*(f"noise.{noise.name}" for noise in spec.noise), *(f"Q.{name}" for name in spec.errors))
 
 
 def shares(process: Process, x: Vector, context: Context) -> tuple[Matrix, Matrix]:
-    """F (n, n) at x (n), and what each of the `sources` adds (s, n, n): they sum up to `Process.linearise`'s Q.
+    """F (n, n) at x (nx), and what each of the `sources` adds (s, n, n): they sum up to `Process.linearise`'s Q.
 
     A full matrix is told apart by Q = U D U^T: the noise of D_j is that of entry j, and acts on those above it too.
     Raises StepError NOT_POSITIVE where a matrix is no covariance.
@@ -27,10 +28,11 @@ def shares(process: Process, x: Vector, context: Context) -> tuple[Matrix, Matri
     Q, Qw = process._Q(environment), process._Qw(environment)
     held = process._held
     if process._continuous and process._integrator == "exact":
-        _, F, G = process._exact(x, np.zeros(len(held)), context)
+        _, F, G = process._exact(x, context)
     else:
-        joint = variables([*x, *np.zeros(len(held))])
-        derivatives = jacobian(process._advance(joint[:n], joint[n:], context), n + len(held))
+        space, joint = model.space, at_zero(n + len(held))
+        after = process._advance(space.plus(x.tolist(), joint[:n]), joint[n:], context)
+        derivatives = jacobian(space.minus(after, values(after).tolist()), n + len(held))
         F, G = derivatives[:, :n], derivatives[:, n:]
     noises = len(process._names)
     added = np.zeros((noises + n, n, n))

@@ -94,8 +94,7 @@ class Subject:
         mine = calls.sensor == sensor
         out = np.zeros(len(calls.row), np.int64)
         out[mine] = [int(bits).bit_count() for bits in work.mask[calls.row[mine], sensor].tolist()]
-        rule = self.spec.initialize
-        if rule is not None and rule.sensor == self.spec.measurements[sensor].name:
+        if self.spec.measurements[sensor].name in [rule.sensor for rule in self.spec.initialize]:
             full = np.flatnonzero(mine & (calls.nis == 0.0))
             out[full[:1]] = 0
         return out

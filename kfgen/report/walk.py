@@ -33,6 +33,7 @@ from kfgen.reference.steady import Steady
 from kfgen.reference.ukf import Ukf
 from kfgen.scalar_names import DOUBLE
 from kfgen.spec.modes import mode_specs
+from kfgen.spec.tree import names
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -94,19 +95,19 @@ class Walker:
         model = self.filters[0].model
         self.model, self.n = model, model.n
         self.step = step_of(spec, model.number)
-        names = [sensor.name for sensor in spec.measurements]
+        sensors = [sensor.name for sensor in spec.measurements]
         self.own = dict.fromkeys(name for process in self.processes for name in sources(process))
-        self.sources = ("start", *(f"sensor.{name}" if name == "start" else name for name in names), *self.own)
-        self.seen = {name: _Seen() for name in names}
-        self.H: dict[str, list[Array]] = {name: [] for name in names}
+        self.sources = ("start", *(f"sensor.{name}" if name == "start" else name for name in sensors), *self.own)
+        self.seen = {name: _Seen() for name in sensors}
+        self.H: dict[str, list[Array]] = {name: [] for name in sensors}
         widths = [len(sensor.components) for sensor in spec.measurements]
         self.first = np.cumsum([0, *widths])
-        self.H_used = {name: np.zeros((m, self.n), bool) for name, m in zip(names, widths, strict=True)}
+        self.H_used = {name: np.zeros((m, self.n), bool) for name, m in zip(sensors, widths, strict=True)}
         self.F_used = np.zeros((self.n, self.n), bool)
         self.Q_used = np.zeros((self.n, self.n), bool)
         self.parts = np.zeros((len(self.sources), self.n, self.n))
         self.onward: Array | None = np.eye(self.n)
-        self.uninitialised = spec.initialize is not None
+        self.awaited = [rule.sensor for rule in spec.initialize]
         self.skipped = 0
 
     def walk(self, rows: int, progress: Callable[[int], None] = lambda row: None) -> Walk:
@@ -161,7 +162,7 @@ class Walker:
         used = tuple(k for k in range(sensor.m) if int(trace.work.mask[row, i]) >> k & 1)
         reading = Reading(sensor, z, used, context)
         if self._initialises(name, used) and accepted:
-            self.uninitialised = False
+            self.awaited.remove(name)
             return
         algorithm = kf.algorithm.of(name)
         start = algorithm.initial()
@@ -183,11 +184,12 @@ class Walker:
             self.H[name].append(H @ self.onward / np.where(size > 0, size, 1.0)[:, None])
 
     def _initialises(self, name: str, used: tuple[int, ...]) -> bool:
-        rule = self.spec.initialize
-        if not self.uninitialised or rule is None or rule.sensor != name:
+        if name not in self.awaited:
             return False
+        (rule,) = (each for each in self.spec.initialize if each.sensor == name)
         components = self.filters[0].sensors[name].components
-        return all(components.index(each) in used for each in rule.states.values())
+        needed = {word for formula in rule.states.values() for word in names(formula.tree)} & set(components)
+        return all(components.index(each) in used for each in needed)
 
     def _pieces(
         self, algorithm: object, detail: object, x: Array, P: Array, reading: Reading
