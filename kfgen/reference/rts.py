@@ -1,7 +1,8 @@
 """The fixed-interval smoother: a filter forwards over a log, then back over its predictions.
 
 Rauch, Tung & Striebel 1965; for sigma points Sarkka 2008, equations 28 to 35 (the unscented Rauch-Tung-Striebel
-smoother). Both are the same recursion: they differ in the covariance of the state before a prediction with that after. Rotations: in the tangent space, at each end as it is seen from there.
+smoother). Both are the same recursion: they differ in the covariance of the state before a prediction with that after.
+Rotations are smoothed in the tangent space, each covariance as it is seen from where its difference is taken.
 """
 
 from __future__ import annotations
