@@ -18,6 +18,14 @@ static bool motor_finite(float a)
     return (view.bits & exponent) != exponent;
 }
 
+/* not 0 for what is below zero: a test without a branch */
+static uint32_t motor_sign_bit(float a)
+{
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return view.bits & 0x80000000u;
+}
+
 /* a in (-half, half], by whole turns of 2 half */
 static float motor_wrap(float a, float half)
 {
@@ -50,9 +58,28 @@ motor_status_t motor_init(motor_t *kf)
     return MOTOR_OK;
 }
 
+/* Variances below zero: as large as rounding has left them, without correlations. all: none has
+   any */
+static motor_status_t motor_settle(motor_real_t P[10], int all)
+{
+    motor_status_t flags = MOTOR_OK;
+    for (int j = 0; j < 4; j++) {
+        const float own = P[j * (j + 1) / 2 + j];
+        if (own < 0.0f || all > 0) {
+            for (int i = 0; i < 4; i++) {
+                P[i < j ? j * (j + 1) / 2 + i : i * (i + 1) / 2 + j] = 0.0f;
+            }
+            P[j * (j + 1) / 2 + j] = fabsf(own);
+            flags |= MOTOR_REGULARIZED;
+        }
+    }
+    return flags;
+}
+
 motor_status_t motor_predict(motor_t *kf, const motor_inputs_t *u)
 {
     if (kf == NULL || u == NULL) { return MOTOR_NULL_ARGUMENT; }
+    motor_status_t flags = MOTOR_OK;
 
     /* arguments */
     if (!motor_finite(u->ua)) { return MOTOR_NOT_FINITE; }
@@ -105,27 +132,34 @@ motor_status_t motor_predict(motor_t *kf, const motor_inputs_t *u)
     kf->x[MOTOR_IA] = ia_next;
     kf->x[MOTOR_IB] = ib_next;
     kf->x[MOTOR_TH] = motor_wrap(th_next, 3.1415927f);
+    const uint32_t signs = motor_sign_bit(p_ia_ia_next);
     kf->P[0] = p_ia_ia_next;
     const float p_ia_ib = kf->P[1];
     const float p_ia_ib_next = 0.98f * (0.98f * p_ia_ib - p_ia_w * t0 + p_ia_th * f_ib_th)
         + p_ib_w_next * f_ia_w + t2 * f_ia_th;
     kf->P[1] = p_ia_ib_next;
+    const uint32_t signs_1 = signs | motor_sign_bit(p_ib_ib_next);
     kf->P[2] = p_ib_ib_next;
     const float p_ia_th_next = 0.00005f * p_ia_w_next + t1;
     kf->P[6] = p_ia_th_next;
     const float p_ib_th_next = 0.00005f * p_ib_w_next + t2;
     kf->P[7] = p_ib_th_next;
+    const uint32_t signs_2 = signs_1 | motor_sign_bit(p_th_th_next);
     kf->P[9] = p_th_th_next;
     kf->P[3] = p_ia_w_next;
     kf->P[4] = p_ib_w_next;
     kf->P[8] = p_w_th_next;
     kf->P[5] = p_w_w_next;
-    return MOTOR_OK;
+    if (signs_2 != 0u) {
+        flags |= motor_settle(kf->P, 0);
+    }
+    return flags;
 }
 
 motor_status_t motor_update_currents(motor_t *kf, const motor_currents_t *z)
 {
     if (kf == NULL || z == NULL) { return MOTOR_NULL_ARGUMENT; }
+    motor_status_t flags = MOTOR_OK;
 
     /* innovation */
     const float ia = kf->x[MOTOR_IA];
@@ -136,7 +170,7 @@ motor_status_t motor_update_currents(motor_t *kf, const motor_currents_t *z)
     /* gain and covariance: a */
     const float p_ia_ia = kf->P[0];
     const float s_a = p_ia_ia + 0.0025f;
-    const float t2 = 1.0f / s_a;
+    const float t2 = 0.9999995f / s_a;
     const float t3 = p_ia_ia * t2;
     const float p_ia_ib = kf->P[1];
     const float t4 = p_ia_ib * t2;
@@ -155,7 +189,7 @@ motor_status_t motor_update_currents(motor_t *kf, const motor_currents_t *z)
     const float p_ib_th = kf->P[7];
     const float t11 = p_ib_th - t4 * p_ia_th;
     const float s_b = t9 + 0.0025f;
-    const float t12 = 1.0f / s_b;
+    const float t12 = 0.9999995f / s_b;
     const float t13 = t8 * t12;
     const float t14 = t9 * t12;
     const float t15 = t10 * t12;
@@ -173,7 +207,11 @@ motor_status_t motor_update_currents(motor_t *kf, const motor_currents_t *z)
     if (!motor_finite(ia_next + ib_next + w_next + th_next + nis + s_a + s_b)) {
         return MOTOR_NOT_FINITE;
     }
-    if (!(s_a > 0.0f) || !(s_b > 0.0f)) { return MOTOR_NOT_POSITIVE; }
+    if (!(s_a > 0.0f)) { return MOTOR_NOT_POSITIVE; }
+    if (t9 < 0.0f) {
+        flags |= motor_settle(kf->P, 1);
+        return flags;
+    }
 
     /* store */
     kf->x[MOTOR_IA] = ia_next;
@@ -181,6 +219,7 @@ motor_status_t motor_update_currents(motor_t *kf, const motor_currents_t *z)
     kf->x[MOTOR_W] = w_next;
     kf->x[MOTOR_TH] = motor_wrap(th_next, 3.1415927f);
     const float p_ia_ia_next = 0.0025f * t3 - t13 * t8;
+    const uint32_t signs = motor_sign_bit(p_ia_ia_next);
     kf->P[0] = p_ia_ia_next;
     const float p_ia_ib_next = 0.0025f * t13;
     kf->P[1] = p_ia_ib_next;
@@ -190,21 +229,23 @@ motor_status_t motor_update_currents(motor_t *kf, const motor_currents_t *z)
     kf->P[3] = p_ia_w_next;
     const float p_ib_w_next = 0.0025f * t15;
     kf->P[4] = p_ib_w_next;
-    const float p_w_w = kf->P[5];
-    const float p_w_w_next = p_w_w - t5 * p_ia_w - t15 * t10;
+    const float p_w_w_next = kf->P[5] - t5 * p_ia_w - t15 * t10;
+    const uint32_t signs_1 = signs | motor_sign_bit(p_w_w_next);
     kf->P[5] = p_w_w_next;
     const float p_ia_th_next = 0.0025f * t6 - t13 * t11;
     kf->P[6] = p_ia_th_next;
     const float p_ib_th_next = 0.0025f * t16;
     kf->P[7] = p_ib_th_next;
-    const float p_w_th = kf->P[8];
-    const float p_w_th_next = p_w_th - t5 * p_ia_th - t15 * t11;
+    const float p_w_th_next = kf->P[8] - t5 * p_ia_th - t15 * t11;
     kf->P[8] = p_w_th_next;
-    const float p_th_th = kf->P[9];
-    const float p_th_th_next = p_th_th - t6 * p_ia_th - t16 * t11;
+    const float p_th_th_next = kf->P[9] - t6 * p_ia_th - t16 * t11;
+    const uint32_t signs_2 = signs_1 | motor_sign_bit(p_th_th_next);
     kf->P[9] = p_th_th_next;
     kf->nis = nis;
-    return MOTOR_OK;
+    if (signs_2 != 0u) {
+        flags |= motor_settle(kf->P, 0);
+    }
+    return flags;
 }
 
 motor_status_t motor_set_state(motor_t *kf, const motor_real_t x[4])
@@ -276,4 +317,4 @@ void motor_get_covariance(const motor_t *kf, motor_real_t P[16])
         }
     }
 }
-/* kfgen: body 46090741549bbbf4865a3325c78782f7 */
+/* kfgen: body 83280894bc476d9750e19f9a5c22ac5b */

@@ -95,7 +95,7 @@ motor_status_t motor_init(motor_t *kf);
  *
  * @param kf  filter
  * @param u   ua [V], ub [V]
- * @return MOTOR_OK, or an error that leaves *kf as it was
+ * @return MOTOR_OK, MOTOR_REGULARIZED, or an error that leaves *kf as it was
  *
  * 48 mul, 40 add, 1 cos, 1 sin, 1 wrap.
  */
@@ -106,7 +106,7 @@ motor_status_t motor_predict(motor_t *kf, const motor_inputs_t *u);
  *
  * @param kf  filter
  * @param z   a [A], b [A]
- * @return MOTOR_OK, or an error that leaves *kf as it was
+ * @return MOTOR_OK, MOTOR_REGULARIZED, or an error that leaves *kf as it was
  *
  * 40 mul, 32 add, 2 div, 2 compare, 1 wrap.
  */
@@ -143,4 +143,4 @@ void motor_get_covariance(const motor_t *kf, motor_real_t P[16]);
 #endif
 
 #endif
-/* kfgen: body 772942c7b1c047872c4fbba1bbdc2add */
+/* kfgen: body 394ad544dc8773096fe2ff1d9dca7baf */

@@ -13,19 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from kfgen.ir.nodes import BOOL, INT, REAL, Constants, Node, Table
-from kfgen.ir.program import (
-    Assign,
-    Call,
-    Declare,
-    Flag,
-    For,
-    Function,
-    Guard,
-    If,
-    Section,
-    Slice,
-    Store,
-)  # fmt: skip
+from kfgen.ir.program import Assign, Call, Declare, Flag, For, Function, Guard, If, Section, Slice, Store
 from kfgen.ir.recording import Block, RecordingPool
 
 Number = int | Fraction
