@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from kfgen.spec.expressions import MAX_EXPONENT, MAX_LENGTH, MAX_NESTING, MAX_NODES
 from kfgen.spec.guide import GUIDE
+from kfgen.spec.handbook import HANDBOOK
 from kfgen.spec.names import MAX_NAME
 from kfgen.spec.reader import MAX_BYTES, MAX_DEPTH
 from kfgen.spec.schema import ADVICE, RECORDS
@@ -128,7 +129,7 @@ def markdown() -> str:
     seen: list[Record] = []
     for record in RECORDS:
         _sections(record, parts, seen)
-    parts.append(GUIDE)
+    parts += [GUIDE, HANDBOOK]
     parts.append(_advice())
     parts.append("## What is decided where the language leaves a choice")
     parts.append("\n".join(f"* {decision}" for decision in DECISIONS))
