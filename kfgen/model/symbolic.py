@@ -122,6 +122,16 @@ def _power(base: Any, exponent: Any) -> Any:
     return base**exponent
 
 
+def _table(x: Any, *data: Any) -> Any:
+    """A table; where its values are no constants (a table of tables, say) their sum, each by its share of x."""
+    count = len(data) // 2
+    points, values = data[:count], data[count:]
+    if not any(value.free_symbols for value in values):
+        return kf.Table(x, *data)
+    shares = [[sympy.Integer(i == k) for k in range(count)] for i in range(count)]
+    return sympy.Add(*[value * kf.Table(x, *points, *share) for value, share in zip(values, shares, strict=True)])
+
+
 _CALLS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -148,7 +158,7 @@ _CALLS: dict[str, Callable[..., Any]] = {
     "max": kf.Maximum,
     "floor": kf.Floor,
     "where": kf.Where,
-    "table": kf.Table,
+    "table": _table,
     "rotation": turning.entry,
     "rotation_vector": turning.rotation_vector,
     "from_rotation_vector": turning.from_rotation_vector,
