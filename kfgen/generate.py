@@ -17,6 +17,7 @@ from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.build import FixedFilter, build_fixed
+from kfgen.fixed.substeps import limit_substeps
 from kfgen.ir.count import operations
 from kfgen.ir.names import RESERVED
 from kfgen.logs import Log, read
@@ -107,6 +108,7 @@ def _predicted(spec: Spec, code: FilterCode, scalar: Scalar, view: View, judge: 
 
 
 def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Generated:
+    limit_substeps(spec)
     scalar = Fixed(spec.scalar, spec.fixed.rounding)
     real = build_filter(spec, scalar, RESERVED)
     logs = [each for each in (_named(spec), log) if each is not None]

@@ -72,7 +72,8 @@ FLOORS = {
                 "build"],
     "filters.covariance": ["names", "noise", "kept", "parts", "base", "motion", "definite", "kernels", "gather",
                            "loops", "straight", "forms", "ud", "full", "sqrt"],
-    "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "build"],
+    "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "substeps",
+              "build"],
 }  # fmt: skip
 """Part or room -> its files and rooms, the lowest first: each imports only what stands before it."""
 
