@@ -18,6 +18,7 @@ from kfgen.filters.base import FilterCode
 from kfgen.filters.build import build_filter
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.build import FixedFilter, build_fixed
+from kfgen.fixed.substeps import limit_substeps
 from kfgen.ir.count import operations
 from kfgen.ir.names import RESERVED
 from kfgen.logs import Log, read
@@ -137,6 +138,7 @@ def _judged(made: Generated, judge: bool) -> Generated:
 
 
 def _fixed(spec: Spec, overridden: bool, log: Log | None, judge: bool) -> Generated:
+    limit_substeps(spec)
     scalar = Fixed(spec.scalar, spec.fixed.rounding)
     real = build_filter(spec, scalar, RESERVED)
     logs = [each for each in (_named(spec), log) if each is not None]

@@ -18,9 +18,10 @@ from kfgen.fixed.linear import linear
 from kfgen.fixed.lowering.lower import lower
 from kfgen.fixed.program.cells import find_arrays
 from kfgen.fixed.program.inline import inlined
+from kfgen.fixed.program.nodes import nodes_of
 from kfgen.fixed.program.unroll import unrolled
 from kfgen.fixed.ranges.box import Box
-from kfgen.fixed.ranges.drive import Drive, Seen
+from kfgen.fixed.ranges.drive import Drive, Player, Seen
 from kfgen.fixed.ranges.intervals import Intervals, spread
 from kfgen.fixed.ranges.ranges import Ranges
 from kfgen.fixed.ranges.real import RealProgram
@@ -38,8 +39,10 @@ from kfgen.logs import Log
 WIDER = 2.0**6  # times what runs have met: an interval that is wider than that has overrated its value
 DRIVEN, TRIED = 21, 31  # seeds of the runs over the box, of the first trial
 TRIALS = 4  # each with runs of its own, until nothing saturates
-INNER, ROWS = 8, 40  # of a trial
+MANY, FEW = 16, 8  # legs that fill the box, of the runs and of a trial
+ROWS, LEAST = 40, 4  # rows of a leg, beside those without readings; the least of rows and legs
 OUTAGES = (24, 12, 4, 0)  # rows without readings
+SIZE = 2000  # operations of a program from which on runs are shorter
 SHORT = 12  # what is less than that is told of
 
 
@@ -117,6 +120,8 @@ class _Builder:
         self.pace = survey(self.runner, self.weather, logs, self.linear)
         self.met = self.ranges.copy()
         self.sizes: Mapping[Node, float] = {}
+        size = sum(node.kind == "real" for f in self.functions for node in nodes_of(f.body))
+        self.share = min(1.0, SIZE / size)
 
     def build(self) -> FixedFilter:
         refusals: list[SpecError] = []
@@ -144,7 +149,7 @@ class _Builder:
 
     def _see(self, drive: Drive, part: Part) -> None:
         """Runs over a part of the box, and what intervals say of it."""
-        drive.run(Recorder(self.runner, self.box, part.limits), DRIVEN)
+        self._run(drive, Recorder(self.runner, self.box, part.limits), DRIVEN, MANY)
         intervals = Intervals(self.real.model, part.box, self.ranges)
         intervals.read(self.functions)
         self.sizes = intervals.sizes
@@ -156,14 +161,18 @@ class _Builder:
             found = self._lowered(part.spare)
             told = self._judged(found)
             tour = Tour(self.program, found.program, self.real, found.formats, found.code, self.box, part.limits)
-            drive.run(tour, TRIED + trial, INNER, ROWS)
+            self._run(drive, tour, TRIED + trial, FEW)
             if not tour.found.saturated:
                 break
         if not tour.found.carried:
             shaken = ShakenTour(self.program, self.real, found.formats, self.box, part.limits)
-            drive.run(shaken, TRIED + trial, INNER, ROWS)
+            self._run(drive, shaken, TRIED + trial, FEW)
             refuse(tour.found, shaken.found, self.real, found.formats, self.scalar)
         return replace(self._filter(found), widest=dict(drive.seen) if self.box.wide else {}, told=told)
+
+    def _run(self, drive: Drive, player: Player, seed: int, inner: int) -> None:
+        """Legs over the box; what has many operations is given fewer and shorter ones."""
+        drive.run(player, seed, max(LEAST, int(inner * self.share)), max(LEAST, int(ROWS * self.share)))
 
     def _lowered(self, spare: int) -> _Lowered:
         hear(self.real.model.spec, self.runner.heard)

@@ -89,6 +89,15 @@ dynamics: {f: {p: p + dt*v}, Q: {v: 0.5}}
 measurements: {m: {z: {p: {h: p, std: 0.5}}}}
 filter: {type: kf}
 """
+PENDULUM = HEAD + """
+name: pendulum
+dt: 0.1
+states: {{th: {{init: 0.1, std: 0.2, kind: angle}}, w: {{init: 0, std: 0.5, range: [-10, 10]}}}}
+dynamics:
+  {{form: continuous, integrator: rk4, substeps: {substeps}, f: {{th: w, w: -9.81*sin(th) - 0.1*w}}, Q: {{w: 0.01}}}}
+measurements: {{enc: {{z: {{s: {{h: sin(th), std: 0.02}}}}}}}}
+filter: {{type: ekf}}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -176,3 +185,10 @@ def test_a_check_tells_a_track_that_leaves_its_range_from_a_wrong_filter():
     assert any(isinstance(part, str) and "steps not compared: there the model's own track" in part
                for part in report(outcome))  # fmt: skip
     assert check(override(loads(WANDER), "double")).outside == 0
+
+
+def test_more_substeps_than_can_be_tried_are_refused_at_once():
+    text = PENDULUM.format(substeps=1000)
+    with pytest.raises(SpecError, match=r"1000 substeps are about .* use at most [0-9]+ substeps, or float"):
+        build(loads(text))
+    assert build(loads(PENDULUM.format(substeps=3))).fixed.told == ()

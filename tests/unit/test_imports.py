@@ -86,7 +86,8 @@ FLOORS = {
                            "loops", "straight", "forms", "ud", "full", "sqrt"],
     "report": ["blocks", "walk", "observability", "equations", "figures", "subject", "sections", "page"],
     "tuning": ["numbers", "opened", "writing", "objective", "search", "curvature"],
-    "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "build"],
+    "fixed": ["arithmetic", "program", "ranges", "formats", "lowering", "trial", "linear", "substeps",
+              "build"],
 }  # fmt: skip
 """Part or room -> its files and rooms, the lowest first: each imports only what stands before it."""
 

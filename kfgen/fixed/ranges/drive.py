@@ -13,10 +13,9 @@ from typing import Protocol
 
 from kfgen.fixed.ranges.box import Box, Span, clipped
 from kfgen.fixed.ranges.generator import Random
-from kfgen.fixed.ranges.legs import INNER, Leg, at, legs
+from kfgen.fixed.ranges.legs import Leg, at, legs
 from kfgen.fixed.ranges.weather import Weather
 
-ROWS = 40  # of a leg, beside those without readings
 DARK = 6  # the row from which on a dark leg has none
 HELD = 6  # rows for which an input keeps its value, at least
 
@@ -63,8 +62,8 @@ class Drive:
         self.model = weather.model
         self.seen: dict[str, Seen] = {}
 
-    def run(self, player: Player, seed: int, inner: int = INNER, rows: int = ROWS) -> None:
-        """All legs."""
+    def run(self, player: Player, seed: int, inner: int, rows: int) -> None:
+        """All legs: the corners, and `inner` ones. rows: of a leg, beside those without readings."""
         random = Random(seed)
         for k, leg in enumerate(legs(self.model, self.box, random, inner)):
             self._leg(player, leg, k, rows, random)

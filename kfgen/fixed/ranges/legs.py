@@ -9,7 +9,6 @@ from kfgen.fixed.ranges.box import Box, Span
 from kfgen.fixed.ranges.generator import Random
 from kfgen.model import Model
 
-INNER = 16  # legs that fill the box
 FEWEST, MOST = 8, 16  # corners
 NEAR = 1e-6  # of a range: how near to its end a corner is
 VANISHING = 1 / 32  # the same where the lower end of a parameter is 0, in every other corner
@@ -33,7 +32,7 @@ class Leg:
     vanishing: bool = False
 
 
-def legs(model: Model, box: Box, random: Random, inner: int = INNER) -> Iterator[Leg]:
+def legs(model: Model, box: Box, random: Random, inner: int) -> Iterator[Leg]:
     """Legs all over the box of a filter: corners first, each with an outage.
 
     Of parameters and dt all ends meet, as far as there are corners enough; they decide how a covariance grows.
