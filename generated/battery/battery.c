@@ -200,7 +200,7 @@ battery_status_t battery_update_terminal(battery_t *kf,
     const float d_v_slow_next = d_v_slow * (t23 ? t16 * t25 : 1.0f);
     const float u_v_fast_v_slow_next = u_v_fast_v_slow - t21 * t19;
     const float u_soc_v_slow_next = u_soc_v_slow - t21 * t20;
-    const float nis = s_voltage > 0.0f ? y_voltage * (y_voltage * t24) : 0.0f;
+    const float nis = s_voltage > 1.1754944e-38f ? y_voltage * (y_voltage * t24) : 0.0f;
 
     /* state and innovation squared */
     const float soc_next = soc + (t20 + t26 * u_soc_v_slow_next) * y_voltage;
@@ -309,4 +309,4 @@ void battery_get_covariance(const battery_t *kf, battery_real_t P[9])
         }
     }
 }
-/* kfgen: body 00596347d422f921edac3cd07ae079b3 */
+/* kfgen: body f55a5c1aeb5ad21800754299ae2fef9e */

@@ -366,8 +366,7 @@ vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z)
     const float u_x_speed_next = t68 - t60 * t53;
     const float t69 = (t49 + t58 * t60) * y_x;
     const float nu_y = y_y - t69;
-    const float nis = (s_x > 0.0f ? y_x * (y_x * t56) : 0.0f)
-        + (s_y > 0.0f ? nu_y * (nu_y * t63) : 0.0f);
+    const float nis = (t55 ? y_x * (y_x * t56) : 0.0f) + (t62 ? nu_y * (nu_y * t63) : 0.0f);
 
     /* state and innovation squared */
     const float x_next = x + (t52 + t58 * t68) * y_x + (t53 + t65 * u_x_speed_next) * nu_y;
@@ -597,4 +596,4 @@ void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25])
         }
     }
 }
-/* kfgen: body c99878d44f68da6f3b9eede3990dced9 */
+/* kfgen: body f3a06fd3883170a543d54a4c4cfc9595 */

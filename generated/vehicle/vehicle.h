@@ -16,7 +16,7 @@
  *
  * RAM 112 bytes a filter. Operations:
  *   predict       94 mul, 62 add, 15 div, 10 compare, 1 cos, 16 select, 1 sin, 1 wrap
- *   update_gnss   95 mul, 70 add, 9 div, 15 compare, 20 select, 1 wrap
+ *   update_gnss   95 mul, 70 add, 9 div, 13 compare, 20 select, 1 wrap
  *   update_speed  14 mul, 13 add, 1 div, 3 compare, 1 wrap
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
@@ -127,7 +127,7 @@ vehicle_status_t vehicle_predict(vehicle_t *kf, const vehicle_inputs_t *u, vehic
  * @param z   x [m], y [m]
  * @return VEHICLE_OK, VEHICLE_ANOMALY, VEHICLE_GATED, or an error that leaves *kf as it was
  *
- * 95 mul, 70 add, 9 div, 15 compare, 20 select, 1 wrap.
+ * 95 mul, 70 add, 9 div, 13 compare, 20 select, 1 wrap.
  */
 vehicle_status_t vehicle_update_gnss(vehicle_t *kf, const vehicle_gnss_t *z);
 
@@ -173,4 +173,4 @@ void vehicle_get_covariance(const vehicle_t *kf, vehicle_real_t P[25]);
 #endif
 
 #endif
-/* kfgen: body da8d90da3027fdb80f738fde55279e52 */
+/* kfgen: body 5b40777851b8cadf25d70cb511e5d9a1 */

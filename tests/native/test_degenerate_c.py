@@ -203,3 +203,29 @@ def test_states_that_a_step_sets_to_an_input(covariance):
     """After predict they are known exactly and correlated with nothing, structurally."""
     outcome = check(override(loads(FORGETFUL), filter={"covariance": covariance}), steps=60)
     assert outcome.passed, outcome
+
+
+DECAYING = """
+kfgen: 1
+name: decaying
+dt: 0.1
+states: {a: {init: 0, std: 1}, b: {init: 0, std: 2}, c: {init: 0, std: 0.5}}
+dynamics: {f: {a: 0.5*a + 0.1*b, b: 0.5*b, c: 0.3*c}, Q: {c: 1e-6}}
+measurements: {m: {z: {z: {h: "HH", std: 0}, y: {h: a, std: 0.1}}}}
+filter: {FORM}
+code: {unroll: UNROLL, log_likelihood: true}
+"""
+
+
+@pytest.mark.parametrize("h", ["b*c + a", "a + 0.1*b**2"])
+def test_a_variance_that_fades_away_locks_nothing_out(h):
+    """An exact component of what is known ever better, until its innovation variance has no reciprocal in a float."""
+    forms = [f"type: {kind}, covariance: {form}" for kind in ("ekf", "ekf2") for form in ("sqrt", "ud")]
+    specs = {(form, unroll): loads(DECAYING.replace("HH", h).replace("FORM", form).replace("UNROLL", unroll))
+             for form in forms for unroll in ("full", "none")}  # fmt: skip
+    for case, kf in built(specs).items():
+        random = np.random.default_rng(0)
+        for k in range(150):
+            assert kf.predict() < ERROR, (case, k)
+            assert kf.update("m", 0.1 * random.normal(size=2)) < ERROR, (case, k)
+        assert np.isfinite([kf.nis, kf.log_likelihood]).all()

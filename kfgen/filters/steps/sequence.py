@@ -98,7 +98,7 @@ class Sequence(Generic[P]):
                 motion, square = gain.applied(motion)
                 sure = is_positive(variances[c]) or self.floor is not None
                 if not sure:  # a direction already known, measured exactly: skipped
-                    square = t.select(variance > 0, square, 0)
+                    square = t.select(variance > t.smallest, square, 0)
                     if not gain.sound or form.factored:
                         failures.append(variance < -low)
                 elif not gain.sound:
@@ -108,7 +108,7 @@ class Sequence(Generic[P]):
                 nis = plus(nis, square)
                 if self.model.spec.code.log_likelihood:
                     term = square + t.function("log", variance) + t.value(log_two_pi())
-                    term = term if sure else t.select(variance > 0, term, 0)
+                    term = term if sure else t.select(variance > t.smallest, term, 0)
                     if innovation.used is not None:
                         term = t.select(innovation.used[c], term, 0)
                     likelihood = plus(likelihood, term)
