@@ -114,8 +114,8 @@ def tuned(
         raise KfgenError(
             f"{spec.name} has no noise whose size stands in it as a number above 0; name what to tune: --free"
         )
-    places = [(slot.place.line, slot.place.column) for slot in slots]
-    doubled = [slot.path for i, slot in enumerate(slots) if places[i] in places[:i]]
+    places = [{(place.line, place.column) for place, _ in slot.spots} for slot in slots]
+    doubled = [slot.path for i, slot in enumerate(slots) if any(places[i] & earlier for earlier in places[:i])]
     if doubled:
         raise KfgenError(f"--free: {doubled[0]} is named twice")
     data = [as_log(log, spec) for log in logs]

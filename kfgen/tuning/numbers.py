@@ -28,7 +28,7 @@ class Slot:
 
     path: as it was asked for. place: where it stands. value: in the spec. literal: which of the numbers in its text,
     None for all of it. positive: tuned in its logarithm. limits: between which it stays. noise: whether it is a noise's
-    size.
+    size. twin: place and literal of the entry of a matrix that has to be the same.
     """
 
     path: str
@@ -38,6 +38,12 @@ class Slot:
     positive: bool
     limits: tuple[float, float]
     noise: bool
+    twin: tuple[Place, int | None] | None = None
+
+    @property
+    def spots(self) -> list[tuple[Place, int | None]]:
+        """Where it is written, and which number of the text it is there."""
+        return [(self.place, self.literal), *([] if self.twin is None else [self.twin])]
 
 
 def expressions(part: object) -> Iterator[Expression]:
@@ -64,6 +70,7 @@ def plain_path(path: str) -> str:
 def written(spec: Spec) -> dict[str, Expression]:
     """Path -> the formula that stands there, of all that stand in the file."""
     found = {plain_path(each.place.path): each for each in expressions(spec) if each.place.path and each.place.line}
+    found = {path: each for path, each in found.items() if not path.endswith(".kind")}  # the period of an angle is 2 pi
     return {path: found[path] for path in sorted(found, key=lambda p: (found[p].place.line, found[p].place.column))}
 
 
@@ -82,14 +89,16 @@ def slot_of(spec: Spec, asked: str, known: Mapping[str, Expression] | None = Non
         raise KfgenError(f"{asked} cannot be tuned: code is generated for the number itself")
     literal = None if top in ("parameters", "constants") else _literal(asked, expression)
     number = _number(spec, expression, literal)
-    noise = _is_noise(spec, path)
+    noise, crossed = _is_noise(spec, path) and not _off_diagonal(path), _off_diagonal(path)
     limits = _range(spec, path)
-    positive = number > 0 and (noise or (_sized(path) and not _off_diagonal(path)) or limits[0] >= 0)
+    positive = number > 0 and not crossed and (noise or _sized(path) or limits[0] >= 0)
     if noise and number < 0:
         raise KfgenError(f"{asked} is {number:g}: a noise cannot be negative")
-    if number == 0 and _sized(path) and not _off_diagonal(path):
+    if number == 0 and _sized(path) and not crossed:
         raise KfgenError(f"{asked} is 0, which switches it off: write a number above 0 to start from")
-    return Slot(asked, expression.place, number, literal, positive, limits, noise)
+    twin = known.get(_OFF_DIAGONAL.sub(r"[\2][\1]", path)) if crossed else None
+    other = None if twin is None else (twin.place, _literal(asked, twin))
+    return Slot(asked, expression.place, number, literal, positive, limits, noise, other)
 
 
 def default_slots(spec: Spec) -> list[Slot]:

@@ -28,7 +28,7 @@ def opened(spec: Spec, slots: list[Slot]) -> Opened:
     """Each slot becomes a parameter: one compilation serves all values of them. KfgenError where one cannot."""
     taken = {name for each in expressions(spec) for name in names(each.tree)} | {p.name for p in spec.parameters}
     hidden: list[str] = []
-    by_place: dict[tuple[int, int], tuple[str, Slot]] = {}
+    by_place: dict[tuple[int, int], tuple[str, int | None]] = {}
     moved: dict[str, Tree] = {}  # constants that are none any more, and what they are
     for i, slot in enumerate(slots):
         top, _, rest = plain_path(slot.place.path).partition(".")
@@ -39,7 +39,7 @@ def opened(spec: Spec, slots: list[Slot]) -> Opened:
         if top == "constants":
             moved[rest] = Name(name)
         elif top != "parameters":
-            by_place[slot.place.line, slot.place.column] = name, slot
+            by_place |= {(place.line, place.column): (name, literal) for place, literal in slot.spots}
     kept = []
     for constant in spec.constants:
         if constant.name in moved:
@@ -54,9 +54,9 @@ def opened(spec: Spec, slots: list[Slot]) -> Opened:
         tree = substituted(expression.tree, moved)
         found = by_place.get((expression.place.line, expression.place.column))
         if found is not None:
-            name, slot = found
+            name, literal = found
             raw = parse(expression.text)
-            put: Tree = Name(name) if slot.literal is None else _put(expression.text, raw, slot.literal, name)
+            put: Tree = Name(name) if literal is None else _put(expression.text, raw, literal, name)
             tree = _exchanged(tree, substituted(raw, moved), substituted(put, moved))
         return expression if tree == expression.tree else replace(expression, tree=tree)
 

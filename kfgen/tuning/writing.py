@@ -33,8 +33,9 @@ def with_numbers(text: str, slots: Sequence[Slot], values: Sequence[float]) -> s
     for slot, number in zip(slots, values, strict=True):
         if number == slot.value:
             continue
-        first = starts[slot.place.line - 1] + slot.place.column - 1 + (mark if slot.place.line == 1 else 0)
-        changes.append((*_span(text, first, slot.literal), spelled(number)))
+        for place, literal in slot.spots:
+            first = starts[place.line - 1] + place.column - 1 + (mark if place.line == 1 else 0)
+            changes.append((*_span(text, first, literal), spelled(number)))
     for begin, end, new in sorted(changes, reverse=True):
         text = text[:begin] + new + text[end:]
     return text

@@ -48,6 +48,7 @@ def test_the_budget_is_that_of_linear_covariance_analysis(linear):
     right = budget_by_hand(spec, log)
     total = sum(right.values())
     for i, state in enumerate(("p", "v", "b")):
+        assert found.data["budget_sigma"][state] == pytest.approx(total[i] ** 0.5, rel=1e-9)
         shares = found.data["budget"][state]
         assert abs(sum(shares.values()) - 1) < 1e-12
         for name, variances in right.items():
@@ -187,6 +188,7 @@ def test_the_command(tmp_path, monkeypatch):
     data = json.loads(done.stdout)
     assert len(data["logs"]) == 2
     assert data["nis"]["fix"]["number"] == 120
+    assert [each["budget"] for each in data["budgets"]] == [data["budget"]] * 2
     assert Path("out.html").read_text().startswith("\n<!DOCTYPE html>"[1:])
     for wrong in ("--log log.csv", "--no-run --log log.csv --json", "--log log.csv -o log.csv"):
         assert kfgen(*wrong.split()).exit_code == 2

@@ -204,3 +204,37 @@ def test_ctrl_c_leaves_what_was_found(judge):
     assert found.curvature is None
     assert found.after.likelihood[0] > found.before.likelihood[0]
     assert found.as_json()["parameters"][0]["std_error"] is None
+
+
+CROSSED = """
+kfgen: 1
+name: crossed
+constants: {r: &shared 0.09}
+dt: 0.1
+states: {p: {init: 0, std: 1}, v: {init: 0, std: "1.0"}}
+dynamics:
+  form: discrete
+  f: {p: "p
+     + dt*v", v: 0.9*v}
+  Q: [[0.02, 0.01], [1e-2, .04]]   # symmetric
+measurements:
+  fix:
+    z: {p: {h: p}, v: {h: v}}
+    R: [[r, "0.02*1.0"], [0.02, *shared]]
+filter: {type: kf}
+"""
+
+
+def test_both_entries_of_a_matrix_change(tmp_path):
+    path = tmp_path / "crossed.yaml"
+    path.write_text(CROSSED)
+    spec = load(path)
+    log = simulate(loads(CROSSED.replace("0.01], [1e-2", "-0.015], [-0.015")), 1500, 1)
+    found = tuned(spec, [log], ["Q[0][1]", "dynamics.Q.1.1", "measurements.fix.R[0][1]"])
+    assert abs(found.values[0] + 0.015) < 3 * found.curvature.errors[0]
+    assert found.slots[0].positive is False
+    (tmp_path / "crossed.yaml").write_text(CROSSED)
+    new = loads(found.text()).dynamics.Q
+    assert new[0][1].text == new[1][0].text == spelled(found.values[0])
+    assert found.text().count(spelled(found.values[2])) == 2
+    assert "   # symmetric" in found.text()

@@ -25,7 +25,12 @@ def section(subject: Subject) -> Section | None:
     budgets = [shares(subject, drive) for drive in subject.drives]
     for drive, found in zip(subject.drives, budgets, strict=True):
         blocks.append(_grid(subject, drive, found))
-    data: dict[str, Any] = {"budget": budgets[0]}
+    data: dict[str, Any] = {"budget": budgets[0], "budget_sigma": _sigma(subject, subject.drives[0])}
+    if len(budgets) > 1:
+        data["budgets"] = [
+            {"log": drive.title, "budget": found, "sigma": _sigma(subject, drive)}
+            for drive, found in zip(subject.drives, budgets, strict=True)
+        ]
     return Section("Error budget", blocks, data)
 
 
@@ -42,16 +47,20 @@ def shares(subject: Subject, drive: Drive) -> dict[str, dict[str, float]]:
     return out
 
 
+def _sigma(subject: Subject, drive: Drive) -> dict[str, float]:
+    """State -> its standard deviation at the end."""
+    variances = np.maximum(np.einsum("sii->i", drive.walk.parts), 0.0)
+    return {name: float(variance**0.5) for name, variance in zip(subject.states, variances, strict=True)}
+
+
 def _grid(subject: Subject, drive: Drive, found: dict[str, dict[str, float]]) -> Grid:
     used = [name for name in drive.walk.sources if any(each.get(name, 0.0) >= 5e-4 for each in found.values())]
-    variances = np.einsum("sii->i", drive.walk.parts)
     rows, bars = [], {}
-    for r, (state, unit, variance) in enumerate(
-        zip(subject.states, [s.unit for s in subject.spec.states], variances, strict=True)
-    ):
-        row = [state, f"{figure(float(max(variance, 0.0)) ** 0.5, 3)} {unit}".strip()]
+    sigmas = _sigma(subject, drive)
+    for r, state in enumerate(subject.spec.states):
+        row = [state.name, f"{figure(sigmas[state.name], 3)} {state.unit}".strip()]
         for c, name in enumerate(used):
-            share = found[state].get(name, 0.0)
+            share = found[state.name].get(name, 0.0)
             row.append(percent(share) if share >= 5e-4 else "")
             bars[r, c + 2] = share
         rows.append(row)

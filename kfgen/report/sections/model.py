@@ -11,7 +11,7 @@ from kfgen.report.subject import Subject
 from kfgen.spec.constants import value
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.tree import Expression
-from kfgen.spec.types import Noise, Range, Sensor, Spec
+from kfgen.spec.types import Noise, Range, Sensor, Spec, State
 
 ORDER = 10
 
@@ -50,7 +50,10 @@ def _modes(spec: Spec) -> list[tuple[Spec, str]]:
 
 def _data(spec: Spec) -> dict[str, Any]:
     return {
-        "states": [{"name": s.name, "unit": s.unit, "kind": s.kind} for s in spec.states],
+        "states": [
+            {"name": s.name, "unit": s.unit, "kind": s.kind, "init": _value(spec, s.init), "std": _std(spec, s)}
+            for s in spec.states
+        ],
         "inputs": [e.name for e in spec.inputs],
         "sensors": {s.name: [c.name for c in s.components] for s in spec.measurements},
         "parameters": {p.name: _value(spec, p.value) for p in spec.parameters},
@@ -60,8 +63,8 @@ def _data(spec: Spec) -> dict[str, Any]:
 def _states(spec: Spec) -> Grid:
     rows = []
     for state in spec.states:
-        variance = _value(spec, state.variance)
-        std = "" if variance is None else figure(variance**0.5)
+        deviation = _std(spec, state)
+        std = "" if deviation is None else figure(deviation)
         rows.append((state.name, state.unit, "" if state.kind == "real" else state.kind, _number(spec, state.init), std,
                      _range(spec, state.range), state.doc))  # fmt: skip
     head = ("state", "unit", "kind", "starts at", "± 1 σ", "range", "meaning")
@@ -75,6 +78,12 @@ def _value(spec: Spec, expression: Expression | None) -> float | None:
         return float(value(expression.tree, spec))
     except Exception:  # it depends on what only the run knows
         return None
+
+
+def _std(spec: Spec, state: State) -> float | None:
+    i = spec.states.index(state)
+    variance = _value(spec, state.variance if spec.P0 is None else spec.P0[i][i])
+    return None if variance is None else variance**0.5
 
 
 def _number(spec: Spec, expression: Expression | None) -> str:
