@@ -61,6 +61,10 @@ _TITLES = {
     ),
     "fixed": ("fixed", ""),
     "code": ("code", ""),
+    "history": (
+        "history",
+        "`<name>_history.h`: the filter with its past. Ages count predictions; a log tells them in `<sensor>.age` or `.time`.",
+    ),
     "imm": ("imm", "The top of the spec is shared; a key of a mode replaces the top-level key whole."),
     "mode": ("imm.modes.<name>", ""),
     "mode state": ("imm.modes.<name>.states.<name>", "Everything else about the state is the top's."),
