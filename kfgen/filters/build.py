@@ -204,9 +204,9 @@ def _common_order(models: tuple[Model, ...]) -> list[int]:
 
 
 def _order(models: tuple[Model, ...]) -> list[int]:
-    """The cheapest inner order; the spec's where D is limited, since D depends on the order."""
+    """The cheapest inner order."""
     n = len(models[0].states)
-    if n == 1 or any(v is not None for model in models for v in (*model.floors, *model.ceilings)):
+    if n == 1:
         return list(range(n))
     F: list[set[int]] = [set() for _ in range(n)]
     noisy: set[int] = set()

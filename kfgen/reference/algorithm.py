@@ -16,7 +16,7 @@ from kfgen.reference.adapt import NOTHING, Adaptation, Adapted
 from kfgen.reference.dual import Matrix, Vector, value_of
 from kfgen.reference.evaluate import Closure
 from kfgen.reference.gates import Gates
-from kfgen.reference.linalg import lower_root, udu
+from kfgen.reference.linalg import EPS
 from kfgen.reference.model import Context, Model
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import Status, StepError
@@ -151,7 +151,6 @@ class Limits:
     def __init__(self, model: Model) -> None:
         options = model.spec.filter
         self.model = model
-        self._covariance = options.covariance
         self._floor = self._compile(options.variance_floor)
         self._ceiling = self._compile(options.variance_ceiling)
 
@@ -173,47 +172,23 @@ class Limits:
                 floor[i] = value_of(closure(environment))
             for i, closure in self._ceiling.items():
                 ceiling[i] = value_of(closure(environment))
-            P, changed = _FORMS[self._covariance](P, floor, ceiling)
+            P, changed = _limited(P, floor, ceiling)
             flags = Status.REGULARIZED if changed else flags
         return self.model.wrap(self.model.clip(x)), P, flags
 
 
-def _limit_full(P: Matrix, floor: Vector, ceiling: Vector) -> tuple[Matrix, bool]:
-    """P_ii raised to the floor; where it exceeds the ceiling its row and column are scaled to it."""
-    variances = P.diagonal()
-    raised = np.maximum(variances, floor)
-    if not np.any(raised > variances) and not np.any(raised > ceiling):
+def _limited(P: Matrix, floor: Vector, ceiling: Vector) -> tuple[Matrix, bool]:
+    """P_ii raised to the floor; where it then exceeds the ceiling its row and column are scaled to it.
+
+    A variance that a factored form may have left a rounding beyond a limit is not beyond it.
+    """
+    room = 4.0 * len(P) * EPS
+    raised = np.where(P.diagonal() < floor * (1.0 - room), floor, P.diagonal())
+    above = raised > ceiling * (1.0 + room)
+    if np.array_equal(raised, P.diagonal()) and not np.any(above):
         return P, False
     P = P.copy()
     np.fill_diagonal(P, raised)
     scale = np.ones(len(P))
-    above = raised > ceiling
     scale[above] = np.sqrt(ceiling[above] / raised[above])
     return P * np.outer(scale, scale), True
-
-
-def _limit_ud(P: Matrix, floor: Vector, ceiling: Vector) -> tuple[Matrix, bool]:
-    """D_j of P = U D U^T, in the spec's order of the states, clamped to [floor, ceiling]."""
-    U, D = udu(P)
-    clamped = np.minimum(np.maximum(D, floor), ceiling)
-    if np.array_equal(clamped, D):
-        return P, False
-    return (U * clamped) @ U.T, True
-
-
-def _limit_sqrt(P: Matrix, floor: Vector, ceiling: Vector) -> tuple[Matrix, bool]:
-    """S_ii^2 of P = S S^T raised to the floor; where it exceeds the ceiling row i of S is scaled to it."""
-    S = lower_root(P)
-    pivots = S.diagonal() ** 2
-    raised = np.maximum(pivots, floor)
-    above = raised > ceiling
-    if not np.any(raised > pivots) and not np.any(above):
-        return P, False
-    np.fill_diagonal(S, np.sqrt(raised))
-    scale = np.ones(len(P))
-    scale[above] = np.sqrt(ceiling[above] / raised[above])
-    S = S * scale[:, None]
-    return S @ S.T, True
-
-
-_FORMS = {"full": _limit_full, "ud": _limit_ud, "sqrt": _limit_sqrt}

@@ -206,10 +206,15 @@ FILTER = Record(
         Key(
             "variance_floor",
             _BY_STATE,
-            "Smallest variance, one for all states or by state (REGULARIZED).",
+            "Smallest variance P_ii, one for all states or by state, in every form: P_ii is raised (REGULARIZED).",
             "off",
         ),
-        Key("variance_ceiling", _BY_STATE, "Largest variance, likewise.", "off"),
+        Key(
+            "variance_ceiling",
+            _BY_STATE,
+            "Largest variance P_ii, likewise, after the floors: row and column i of P are scaled down.",
+            "off",
+        ),
         Key("innovation_floor", _COMPILED, "Smallest innovation variance (REGULARIZED).", "off"),
         Key(
             "gain_limit",

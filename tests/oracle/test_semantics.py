@@ -106,20 +106,17 @@ def test_initialize():
 def test_floor_and_ceiling():
     base = one_state("  form: discrete\n  f: {x: x + y}", states="  y: {init: 0, var: 2}")
     P = np.array([[2.5, 2.0], [2.0, 2.0]])
-    for form, floor, expected in [
-        ("full", "3", np.array([[3.0, 2.0], [2.0, 3.0]])),
-        ("ud", "1", np.array([[3.0, 2.0], [2.0, 2.0]])),  # D = (0.5, 2), U_01 = 1
-    ]:
-        kf = build(base.replace("type: ekf", f"type: ekf, covariance: {form}, variance_floor: {floor}"))
-        assert kf.predict() == Status.REGULARIZED
-        np.testing.assert_allclose(kf.P, expected, rtol=1e-14)
-    for form, ceiling, expected in [
-        ("full", "{x: 1}", np.array([[1.0, 2.0 / math.sqrt(2.5)], [2.0 / math.sqrt(2.5), 2.0]])),
-        ("ud", "{y: 1}", np.array([[1.5, 1.0], [1.0, 1.0]])),
-    ]:
-        kf = build(base.replace("type: ekf", f"type: ekf, covariance: {form}, variance_ceiling: {ceiling}"))
-        assert kf.predict() == Status.REGULARIZED
-        np.testing.assert_allclose(kf.P, expected, rtol=1e-14)
+    for form in ("full", "ud", "sqrt"):  # the same numbers in every form
+        for limit, expected in [
+            ("variance_floor: 3", [[3.0, 2.0], [2.0, 3.0]]),
+            ("variance_floor: {y: 3}", [[2.5, 2.0], [2.0, 3.0]]),
+            ("variance_ceiling: {x: 1}", [[1.0, 2.0 / math.sqrt(2.5)], [2.0 / math.sqrt(2.5), 2.0]]),
+            ("variance_ceiling: {y: 1}", [[2.5, math.sqrt(2.0)], [math.sqrt(2.0), 1.0]]),
+            ("variance_floor: {x: 5}, variance_ceiling: {y: 0.5}", [[5.0, 1.0], [1.0, 0.5]]),
+        ]:
+            kf = build(base.replace("type: ekf", f"type: ekf, covariance: {form}, {limit}"))
+            assert kf.predict() == Status.REGULARIZED
+            np.testing.assert_allclose(kf.P, expected, rtol=1e-14)
     kf = build(base.replace("type: ekf", "type: ekf, variance_floor: 1e-9, variance_ceiling: 1e9"))
     assert kf.predict() == 0
     np.testing.assert_allclose(kf.P, P, rtol=1e-14)

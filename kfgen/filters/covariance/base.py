@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any, Protocol, Self, TypeVar
 
+from kfgen.filters.algebra.limits import Limits
 from kfgen.filters.algebra.linalg import Rows, Vector
 from kfgen.filters.algebra.numbers import Number
 from kfgen.filters.algebra.symmetric import Symmetric
@@ -107,8 +108,8 @@ class Form(Protocol[P]):
         """How far below zero h P h^T may come out by round-off."""
         ...
 
-    def limit(self, t: Trace, P: P, floors: list[Fraction | None], ceilings: list[Fraction | None]) -> P:
-        """variance_floor and variance_ceiling, flagged REGULARIZED."""
+    def limit(self, t: Trace, P: P, floors: Limits, ceilings: Limits, epsilon: Fraction) -> P:
+        """variance_floor and variance_ceiling of P_ii, floors first, flagged REGULARIZED. epsilon: of the scalar."""
         ...
 
     def evidence(self, P: P, after_predict: bool) -> list[Value]:

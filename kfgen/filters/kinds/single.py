@@ -197,7 +197,7 @@ class SingleFilter(ABC):
         if not any(v is not None for v in (*floors, *ceilings)):
             return P
         t.section("limits of the variances")
-        return self.form.limit(t, P, floors, ceilings)
+        return self.form.limit(t, P, floors, ceilings, self.scalar.epsilon)
 
     def unconfined(self, x: list[Value]) -> list[Value]:
         """States before their bounds, which would hide what is infinite."""

@@ -7,6 +7,7 @@ from copy import copy
 from dataclasses import replace
 from fractions import Fraction
 
+from kfgen.filters.algebra.limits import Limits
 from kfgen.filters.algebra.linalg import Rows, Vector, dot, plus, times
 from kfgen.filters.algebra.numbers import Number, is_one, is_zero, select, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric
@@ -180,7 +181,7 @@ class LoopedFull(Looped, FullStore):
         return P
 
     def limit(
-        self, t: Trace, P: ArrayEntries, floors: list[Fraction | None], ceilings: list[Fraction | None]
+        self, t: Trace, P: ArrayEntries, floors: Limits, ceilings: Limits, epsilon: Fraction
     ) -> ArrayEntries:
         if not P.square:
             P = P.written()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.filters.algebra.factors import cholesky, factor_columns, indefinite, udu_computed
+from kfgen.filters.algebra.limits import Limits
 from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, quotients, times
 from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, is_positive, is_zero, select, sqrt
@@ -101,8 +102,9 @@ class StraightFull(StraightLine, FullStore):
     def tolerance(self, P: Symmetric, h: Vector) -> Value | int:
         return round_off(P, h, self.epsilon)
 
-    def limit(self, t: Trace, P: Symmetric, floors: list[Fraction | None], ceilings: list[Fraction | None]
-              ) -> Symmetric:  # fmt: skip
+    def limit(
+        self, t: Trace, P: Symmetric, floors: Limits, ceilings: Limits, epsilon: Fraction
+    ) -> Symmetric:
         """variance_floor raises P_ii; variance_ceiling scales row and column i down."""
         low, high, scale = {}, {}, {}
         for i, floor in enumerate(floors):

@@ -100,6 +100,12 @@ class Absorber:
         arrays: list[Passed] = [(each.name, 0) for each in (U, D, self.columns(space))]
         space.t.call(absorb(self.kernels, self.n, sure), [*arrays, *weights, count])
 
+    def absorb_unit(self, space: Space, i: int, weight: Value) -> None:
+        """+ weight e_i e_i^T; the columns have been asked for before."""
+        t = space.t
+        self.columns(space)[i] = 1
+        self.absorb(space, False, [weight, t.zero], integer(t, i + 1))
+
     def remove(self, space: Space, c: Array, s: Value, tolerance: Fraction, known: Fraction | None) -> Value:
         """- c c^T / s; the condition that the result is indefinite beyond `tolerance`. known: a D up to this part of
         the variance is a direction without spread."""

@@ -37,7 +37,7 @@ class LoopedFactors(Generic[P]):
         self.space = Space(t)
         self.failures: list[Value] = []
         absorber.start(t, self.space, Q)
-        self.w = self.space.array("w", self.n)
+        self.w = self.space.array("column", self.n)
         for w, d in columns:
             if not is_zero(d):
                 self.add(w, assume_nonnegative(d))

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 
+from kfgen.filters.algebra.limits import Limits, margin
 from kfgen.filters.algebra.linalg import Rows, Vector, times
 from kfgen.filters.algebra.numbers import (
     Number,
     assume_nonnegative,
-    constant_root,
     is_positive,
     is_zero,
     reciprocal,
-    select,
     sqrt,
 )  # fmt: skip
 from kfgen.filters.algebra.symmetric import Symmetric
@@ -194,26 +193,37 @@ class LoopedSqrt(ByFactors, SqrtStore):
                 array[i] = array[i] * root
         return P
 
-    def limit(
-        self, t: Trace, P: ArrayRoot, floors: list[Fraction | None], ceilings: list[Fraction | None]
-    ) -> ArrayRoot:
-        """variance_floor raises S_ii^2; variance_ceiling scales row i down."""
+    def limit(self, t: Trace, P: ArrayRoot, floors: Limits, ceilings: Limits, epsilon: Fraction) -> ArrayRoot:
+        """A floor by way of U D U^T, where it is met; a ceiling scales row i down."""
         P = self._owned(P)
         U, D = self.absorber.arrays(P.space)
-        for i, (low, high) in enumerate(zip(floors, ceilings, strict=True)):
-            if low is not None:
-                edge = constant_root(low)
-                own = t.name(D[i], f"s_{self.names[i]}")
-                t.flag(own < edge, "REGULARIZED")
-                D[i] = select(own < edge, t.value(edge), own)
-            if high is not None:
-                edge = constant_root(high)
-                own = t.name(D[i], f"s_{self.names[i]}")
-                t.flag(own > edge, "REGULARIZED")
-                scale = t.name(select(own > edge, edge / own, 1), "scale")
-                D[i] = own * scale
-                with t.loop("j", i + 1, self.n) as j:
-                    U[strict_start(j) + i] = U[strict_start(j) + i] * scale
+        n, room = self.n, margin(self.n, epsilon)
+        for i, floor in enumerate(floors):
+            if floor is not None:
+                p = self._entry(P, i, i)
+                below = t.name(p < floor * (1 - room), "below")
+                t.flag(below, "REGULARIZED")
+                self.absorber.columns(P.space)
+                with t.when(below):
+                    lack = t.name(floor - p, "lack")
+                    with t.loop("j", 0, n) as j:
+                        d = t.name(D[j], "d")
+                        inverse = t.name(reciprocal(assume_nonnegative(d))[1], "inverse")
+                        D[j] = d * d
+                        with t.loop("k", 0, j) as k:
+                            U[strict_start(j) + k] = U[strict_start(j) + k] * inverse
+                    self.absorber.absorb_unit(P.space, i, lack)
+                    self._take_roots(P.space)
+        for i, ceiling in enumerate(ceilings):
+            if ceiling is not None:
+                p = self._entry(P, i, i)
+                above = t.name(p > ceiling * (1 + room), "above")
+                t.flag(above, "REGULARIZED")
+                with t.when(above):
+                    scale = t.name(sqrt(ceiling / p), "scale")
+                    D[i] = D[i] * scale
+                    with t.loop("j", i + 1, n) as j:
+                        U[strict_start(j) + i] = U[strict_start(j) + i] * scale
         return P
 
     def evidence(self, P: ArrayRoot, after_predict: bool) -> list[Value]:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import reduce
+from operator import or_
 
 from kfgen.filters.algebra.factors import columns_of, root_of_factors, udu
+from kfgen.filters.algebra.limits import Limits, margin, raised
 from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, plus, quotients, times, zeros
 from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import (
     Number,
     assume_nonnegative,
     assume_positive,
-    constant_root,
     is_positive,
     is_zero,
     reciprocal,
@@ -200,19 +202,27 @@ class StraightSqrt(StraightLine, SqrtStore):
         """None: a sum of squares is not negative."""
         return 0
 
-    def limit(self, t: Trace, P: Rows, floors: list[Fraction | None], ceilings: list[Fraction | None]) -> Rows:
-        """variance_floor raises S_ii^2; variance_ceiling scales row i down."""
-        for i, (low, high) in enumerate(zip(floors, ceilings, strict=True)):
-            if low is not None:
-                edge = constant_root(low)
-                t.flag(P[i][i] < edge, "REGULARIZED")
-                P[i][i] = select(P[i][i] < edge, t.value(edge), P[i][i])
-            if high is not None:
-                edge = constant_root(high)
-                t.flag(P[i][i] > edge, "REGULARIZED")
-                scale = select(P[i][i] > edge, edge / P[i][i], 1)
-                P[i] = [times(x, scale) for x in P[i]]
-        return P
+    def limit(self, t: Trace, P: Rows, floors: Limits, ceilings: Limits, epsilon: Fraction) -> Rows:
+        """A floor by way of U D U^T, where one is met; a ceiling scales row i down."""
+        n, S = self.n, [list(row) for row in P]
+        if any(floor is not None for floor in floors):
+            U, D = self.factors(S)
+            below = list(raised(U, D, floors, epsilon).values())
+            for condition in below:
+                t.flag(condition, "REGULARIZED")
+            met, new = t.name(reduce(or_, below), "below"), root_of_factors(U, D)
+            S = [[select(met, new[i][j], S[i][j]) if i <= j else S[i][j] for j in range(n)] for i in range(n)]
+            for i in range(n):
+                assume_nonnegative(S[i][i])
+        for i, ceiling in enumerate(ceilings):
+            if ceiling is not None:
+                p = dot(S[i][i:], S[i][i:])
+                above = p > ceiling * (1 + margin(n, epsilon))
+                t.flag(above, "REGULARIZED")
+                scale = assume_nonnegative(select(above, sqrt(ceiling / p), 1))
+                S[i] = [times(x, scale) for x in S[i]]
+                assume_nonnegative(S[i][i])
+        return S
 
     def evidence(self, P: Rows, after_predict: bool) -> list[Value]:
         """After an update none beside x: a gain that has met a value that is not finite stays so."""

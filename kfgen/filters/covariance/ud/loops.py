@@ -7,8 +7,9 @@ from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
 
+from kfgen.filters.algebra.limits import Limits, margin
 from kfgen.filters.algebra.linalg import Rows, Vector, times
-from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_positive, is_zero
+from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_positive, is_zero, sqrt
 from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.algebra.triangles import strict, strict_size, strict_start
 from kfgen.filters.covariance.kernels.function import Passed, integer
@@ -27,7 +28,7 @@ from kfgen.filters.covariance.loops.space import Space, fill
 from kfgen.filters.covariance.noise import Additive
 from kfgen.filters.covariance.parts import Gatherer, Gathering, Part, Removal, Scalar
 from kfgen.filters.covariance.ud.store import UDStore
-from kfgen.filters.covariance.ud.straight import StraightUD, limited
+from kfgen.filters.covariance.ud.straight import StraightUD
 from kfgen.filters.frame.runs import Put
 from kfgen.ir.trace import Array, Trace, Value
 
@@ -166,15 +167,31 @@ class LoopedUD(ByFactors, UDStore):
         """None: a sum of D_j f_j^2 is not negative."""
         return 0
 
-    def limit(
-        self, t: Trace, P: ArrayFactors, floors: list[Fraction | None], ceilings: list[Fraction | None]
-    ) -> ArrayFactors:
+    def limit(self, t: Trace, P: ArrayFactors, floors: Limits, ceilings: Limits, epsilon: Fraction) -> ArrayFactors:
         P = self._owned(P)
-        array = P.space.arrays["diagonal"]
-        D: Vector = [t.name(array[j], f"d_{name}") for j, name in enumerate(self.names)]
-        for j, (new, old) in enumerate(zip(limited(t, D, floors, ceilings), D, strict=True)):
-            if new is not old:
-                array[j] = new
+        U, D = self.absorber.arrays(P.space)
+        n, room = self.n, margin(self.n, epsilon)
+        for i, floor in enumerate(floors):
+            if floor is not None:
+                p = self._entry(P, i, i)
+                below = t.name(p < floor * (1 - room), "below")
+                t.flag(below, "REGULARIZED")
+                self.absorber.columns(P.space)
+                with t.when(below):
+                    self.absorber.absorb_unit(P.space, i, floor - p)
+        for i, ceiling in enumerate(ceilings):
+            if ceiling is not None:
+                p = self._entry(P, i, i)
+                above = t.name(p > ceiling * (1 + room), "above")
+                t.flag(above, "REGULARIZED")
+                with t.when(above):
+                    square = t.name(ceiling / p, "square")
+                    scale = t.name(sqrt(square), "scale")
+                    D[i] = D[i] * square
+                    with t.loop("k", 0, i) as k:
+                        U[strict(0, i) + k] = U[strict(0, i) + k] * (1 / scale)
+                    with t.loop("j", i + 1, n) as j:
+                        U[strict_start(j) + i] = U[strict_start(j) + i] * scale
         return P
 
     def evidence(self, P: ArrayFactors, after_predict: bool) -> list[Value]:

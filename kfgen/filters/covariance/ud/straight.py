@@ -5,9 +5,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 from kfgen.filters.algebra.factors import columns_of, factor_columns, gram_schmidt, root_of_factors, solved, udu
+from kfgen.filters.algebra.limits import Limits, lowered, raised
 from kfgen.filters.algebra.linalg import Rows, Vector, dot, quotients, times
 from kfgen.filters.algebra.measurement import Measurement, bierman, downdate
-from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_one, is_zero, require_nonnegative, select
+from kfgen.filters.algebra.numbers import Number, assume_nonnegative, is_one, is_zero, require_nonnegative
 from kfgen.filters.algebra.rank_one import rank_one, unit_columns
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.algebra.triangles import strict
@@ -129,11 +130,12 @@ class StraightUD(StraightLine, UDStore):
         """None: a sum of D_j f_j^2 is not negative."""
         return 0
 
-    def limit(
-        self, t: Trace, P: Factors, floors: list[Fraction | None], ceilings: list[Fraction | None]
-    ) -> Factors:
-        """variance_floor and variance_ceiling, on D."""
-        return P[0], limited(t, P[1], floors, ceilings)
+    def limit(self, t: Trace, P: Factors, floors: Limits, ceilings: Limits, epsilon: Fraction) -> Factors:
+        U, D = [list(row) for row in P[0]], list(P[1])
+        for beyond in (raised(U, D, floors, epsilon), lowered(U, D, ceilings, epsilon)):
+            for condition in beyond.values():
+                t.flag(condition, "REGULARIZED")
+        return U, D
 
     def evidence(self, P: Factors, after_predict: bool) -> list[Value]:
         """Values whose finiteness shows that of all of P.
@@ -196,16 +198,3 @@ class StraightUD(StraightLine, UDStore):
         dense = self.entries(P)
         known = [dense[j, j] * tolerance for j in range(self.n)]  # a pivot up to it is a direction without spread
         return [solved(*P, c, known) for c in columns]
-
-
-def limited(t: Trace, D: Vector, floors: list[Fraction | None], ceilings: list[Fraction | None]) -> Vector:
-    """D (n,) between its limits, flagged REGULARIZED."""
-    out = list(D)
-    for j, (low, high) in enumerate(zip(floors, ceilings, strict=True)):
-        if low is not None:
-            t.flag(out[j] < low, "REGULARIZED")
-            out[j] = select(out[j] < low, t.value(low), out[j])
-        if high is not None:
-            t.flag(out[j] > high, "REGULARIZED")
-            out[j] = select(out[j] > high, t.value(high), out[j])
-    return out
