@@ -18,6 +18,14 @@ static bool maneuver_finite(float a)
     return (view.bits & exponent) != exponent;
 }
 
+/* not 0 for what is below zero: a test without a branch */
+static uint32_t maneuver_sign_bit(float a)
+{
+    union { float value; uint32_t bits; } view;
+    view.value = a;
+    return view.bits & 0x80000000u;
+}
+
 static float maneuver_min(float a, float b)
 {
     return b < a ? b : a;
@@ -130,9 +138,28 @@ maneuver_status_t maneuver_init(maneuver_t *kf)
     return MANEUVER_OK;
 }
 
+/* Variances below zero: as large as rounding has left them, without correlations. all: none has
+   any */
+static maneuver_status_t maneuver_settle(maneuver_real_t P[21], int all)
+{
+    maneuver_status_t flags = MANEUVER_OK;
+    for (int j = 0; j < 6; j++) {
+        const float own = P[j * (j + 1) / 2 + j];
+        if (own < 0.0f || all > 0) {
+            for (int i = 0; i < 6; i++) {
+                P[i < j ? j * (j + 1) / 2 + i : i * (i + 1) / 2 + j] = 0.0f;
+            }
+            P[j * (j + 1) / 2 + j] = fabsf(own);
+            flags |= MANEUVER_REGULARIZED;
+        }
+    }
+    return flags;
+}
+
 maneuver_status_t maneuver_predict(maneuver_t *kf)
 {
     if (kf == NULL) { return MANEUVER_NULL_ARGUMENT; }
+    maneuver_status_t flags = MANEUVER_OK;
     const float mu_cruise = kf->mu[MANEUVER_MODE_CRUISE];
     const float mu_speed = kf->mu[MANEUVER_MODE_SPEED];
     const float mu_turn = kf->mu[MANEUVER_MODE_TURN];
@@ -620,11 +647,13 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.cruise.x[MANEUVER_TH] = th_cruise_1;
     kf->modes.cruise.x[MANEUVER_A] = a_next_cruise;
     kf->modes.cruise.x[MANEUVER_W] = w_next_cruise;
+    const uint32_t signs_cruise = maneuver_sign_bit(p_px_px_next_cruise_1);
     kf->modes.cruise.P[0] = p_px_px_next_cruise_1;
     const float p_px_py_next_cruise_1 = p_px_py_next_cruise + p_px_v_next_cruise * sin_th_cruise
         + p_px_th_next_cruise * f_py_th_cruise + p_py_v_next_cruise_1 * cos_th_cruise
         - p_py_th_next_cruise_1 * t67;
     kf->modes.cruise.P[1] = p_px_py_next_cruise_1;
+    const uint32_t signs_cruise_1 = signs_cruise | maneuver_sign_bit(p_py_py_next_cruise_1);
     kf->modes.cruise.P[2] = p_py_py_next_cruise_1;
     kf->modes.cruise.P[3] = p_px_v_next_cruise_1;
     kf->modes.cruise.P[4] = p_py_v_next_cruise_1;
@@ -667,16 +696,19 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.speed.x[MANEUVER_TH] = th_speed_1;
     kf->modes.speed.x[MANEUVER_A] = a_speed_1;
     kf->modes.speed.x[MANEUVER_W] = w_next_speed;
+    const uint32_t signs_speed = maneuver_sign_bit(p_px_px_next_speed_1);
     kf->modes.speed.P[0] = p_px_px_next_speed_1;
     const float p_px_py_next_speed_1 = p_px_py_next_speed + p_px_v_next_speed * sin_th_speed
         + p_px_th_next_speed * f_py_th_speed + p_px_a_next_speed * f_py_a_speed + t71 * cos_th_speed
         - p_py_th_next_speed_1 * t69 + p_py_a_next_speed_1 * f_px_a_speed;
     kf->modes.speed.P[1] = p_px_py_next_speed_1;
+    const uint32_t signs_speed_1 = signs_speed | maneuver_sign_bit(p_py_py_next_speed_1);
     kf->modes.speed.P[2] = p_py_py_next_speed_1;
     const float p_px_v_next_speed_1 = t70 + p_px_a_next_speed_1;
     kf->modes.speed.P[3] = p_px_v_next_speed_1;
     const float p_py_v_next_speed_1 = t71 + p_py_a_next_speed_1;
     kf->modes.speed.P[4] = p_py_v_next_speed_1;
+    const uint32_t signs_speed_2 = signs_speed_1 | maneuver_sign_bit(p_v_v_next_speed_1);
     kf->modes.speed.P[5] = p_v_v_next_speed_1;
     kf->modes.speed.P[6] = p_px_th_next_speed_1;
     kf->modes.speed.P[7] = p_py_th_next_speed_1;
@@ -711,11 +743,13 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.turn.x[MANEUVER_TH] = t77;
     kf->modes.turn.x[MANEUVER_A] = a_next_turn;
     kf->modes.turn.x[MANEUVER_W] = w_turn_1;
+    const uint32_t signs_turn = maneuver_sign_bit(p_px_px_next_turn_1);
     kf->modes.turn.P[0] = p_px_px_next_turn_1;
     const float p_px_py_next_turn_1 = p_px_py_next_turn + p_px_v_next_turn * f_py_v_turn
         + p_px_th_next_turn * f_py_th_turn + p_px_w_next_turn * f_py_w_turn
         + p_py_v_next_turn_1 * f_px_v_turn - t76 * t73 - p_py_w_next_turn_1 * t74;
     kf->modes.turn.P[1] = p_px_py_next_turn_1;
+    const uint32_t signs_turn_1 = signs_turn | maneuver_sign_bit(p_py_py_next_turn_1);
     kf->modes.turn.P[2] = p_py_py_next_turn_1;
     kf->modes.turn.P[3] = p_px_v_next_turn_1;
     kf->modes.turn.P[4] = p_py_v_next_turn_1;
@@ -726,6 +760,7 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->modes.turn.P[7] = p_py_th_next_turn_1;
     const float p_v_th_next_turn_1 = p_v_th_next_turn + p_v_w_next_turn;
     kf->modes.turn.P[8] = p_v_th_next_turn_1;
+    const uint32_t signs_turn_2 = signs_turn_1 | maneuver_sign_bit(p_th_th_next_turn_1);
     kf->modes.turn.P[9] = p_th_th_next_turn_1;
     const float p_px_a_next_turn_1 = 0.5f
         * (p_px_a_next_turn + p_v_a_next_turn * f_px_v_turn - p_th_a_next_turn * t73
@@ -758,7 +793,16 @@ maneuver_status_t maneuver_predict(maneuver_t *kf)
     kf->x[MANEUVER_TH] = maneuver_wrap(th_all, 3.1415927f);
     kf->x[MANEUVER_A] = a_all;
     kf->x[MANEUVER_W] = w_all;
-    return MANEUVER_OK;
+    if (signs_cruise_1 != 0u) {
+        flags |= maneuver_settle(kf->modes.cruise.P, 0);
+    }
+    if (signs_speed_2 != 0u) {
+        flags |= maneuver_settle(kf->modes.speed.P, 0);
+    }
+    if (signs_turn_2 != 0u) {
+        flags |= maneuver_settle(kf->modes.turn.P, 0);
+    }
+    return flags;
 }
 
 maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *z)
@@ -801,7 +845,7 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float p_py_w_cruise = kf->modes.cruise.P[16];
     const float t10 = p_px_w_cruise * h_range_px_cruise + p_py_w_cruise * h_range_py_cruise;
     const float s_range_cruise = h_range_px_cruise * t5 + h_range_py_cruise * t6 + 400.0f;
-    const float t11 = 1.0f / s_range_cruise;
+    const float t11 = 0.9999995f / s_range_cruise;
     const float t12 = t5 * t11;
     const float t13 = t6 * t11;
     const float t14 = t7 * t11;
@@ -831,7 +875,7 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float t36 = p_py_w_cruise - t13 * t10;
     const float t37 = t36 * h_bearing_py_cruise - t35 * t3;
     const float s_bearing_cruise = h_bearing_py_cruise * t25 - t3 * t23 + 1.0e-6f;
-    const float t38 = 1.0f / s_bearing_cruise;
+    const float t38 = 0.9999995f / s_bearing_cruise;
     const float t39 = t23 * t38;
     const float t40 = t25 * t38;
     const float t41 = t28 * t38;
@@ -861,6 +905,10 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     /* cruise: guards */
     if (!maneuver_finite(y_range_cruise + t4 + s_range_cruise + s_bearing_cruise)) {
         return MANEUVER_NOT_FINITE;
+    }
+    if (s_range_cruise < 200.0f || s_bearing_cruise < 5.0e-7f) {
+        flags |= maneuver_settle(kf->modes.cruise.P, 1);
+        return flags;
     }
 
     /* speed: innovation */
@@ -898,7 +946,7 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float p_py_w_speed = kf->modes.speed.P[16];
     const float t58 = p_px_w_speed * h_range_px_speed + p_py_w_speed * h_range_py_speed;
     const float s_range_speed = h_range_px_speed * t53 + h_range_py_speed * t54 + 400.0f;
-    const float t59 = 1.0f / s_range_speed;
+    const float t59 = 0.9999995f / s_range_speed;
     const float t60 = t53 * t59;
     const float t61 = t54 * t59;
     const float t62 = t55 * t59;
@@ -928,7 +976,7 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float t84 = p_py_w_speed - t61 * t58;
     const float t85 = t84 * h_bearing_py_speed - t83 * t51;
     const float s_bearing_speed = h_bearing_py_speed * t73 - t51 * t71 + 1.0e-6f;
-    const float t86 = 1.0f / s_bearing_speed;
+    const float t86 = 0.9999995f / s_bearing_speed;
     const float t87 = t71 * t86;
     const float t88 = t73 * t86;
     const float t89 = t76 * t86;
@@ -958,6 +1006,10 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     /* speed: guards */
     if (!maneuver_finite(y_range_speed + t52 + s_range_speed + s_bearing_speed)) {
         return MANEUVER_NOT_FINITE;
+    }
+    if (s_range_speed < 200.0f || s_bearing_speed < 5.0e-7f) {
+        flags |= maneuver_settle(kf->modes.speed.P, 1);
+        return flags;
     }
 
     /* turn: innovation */
@@ -995,7 +1047,7 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float p_py_w_turn = kf->modes.turn.P[16];
     const float t106 = p_px_w_turn * h_range_px_turn + p_py_w_turn * h_range_py_turn;
     const float s_range_turn = h_range_px_turn * t101 + h_range_py_turn * t102 + 400.0f;
-    const float t107 = 1.0f / s_range_turn;
+    const float t107 = 0.9999995f / s_range_turn;
     const float t108 = t101 * t107;
     const float t109 = t102 * t107;
     const float t110 = t103 * t107;
@@ -1025,7 +1077,7 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     const float t132 = p_py_w_turn - t109 * t106;
     const float t133 = t132 * h_bearing_py_turn - t131 * t99;
     const float s_bearing_turn = h_bearing_py_turn * t121 - t99 * t119 + 1.0e-6f;
-    const float t134 = 1.0f / s_bearing_turn;
+    const float t134 = 0.9999995f / s_bearing_turn;
     const float t135 = t119 * t134;
     const float t136 = t121 * t134;
     const float t137 = t124 * t134;
@@ -1056,9 +1108,10 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     if (!maneuver_finite(y_range_turn + t100 + s_range_turn + s_bearing_turn)) {
         return MANEUVER_NOT_FINITE;
     }
-    if (!(s_range_cruise > 0.0f) || !(s_bearing_cruise > 0.0f)) { return MANEUVER_NOT_POSITIVE; }
-    if (!(s_range_speed > 0.0f) || !(s_bearing_speed > 0.0f)) { return MANEUVER_NOT_POSITIVE; }
-    if (!(s_range_turn > 0.0f) || !(s_bearing_turn > 0.0f)) { return MANEUVER_NOT_POSITIVE; }
+    if (s_range_turn < 200.0f || s_bearing_turn < 5.0e-7f) {
+        flags |= maneuver_settle(kf->modes.turn.P, 1);
+        return flags;
+    }
 
     /* gate */
     const bool t144 = nis_cruise > 18.420681f && nis_speed > 18.420681f && nis_turn > 18.420681f;
@@ -1139,56 +1192,52 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->modes.cruise.x[MANEUVER_A] = a_next_cruise;
     kf->modes.cruise.x[MANEUVER_W] = w_next_cruise;
     const float p_px_px_next_cruise = t21 - t39 * t23;
+    const uint32_t signs_cruise = maneuver_sign_bit(p_px_px_next_cruise);
     kf->modes.cruise.P[0] = p_px_px_next_cruise;
     const float p_px_py_next_cruise = t22 - t39 * t25;
     kf->modes.cruise.P[1] = p_px_py_next_cruise;
     const float p_py_py_next_cruise = t24 - t40 * t25;
+    const uint32_t signs_cruise_1 = signs_cruise | maneuver_sign_bit(p_py_py_next_cruise);
     kf->modes.cruise.P[2] = p_py_py_next_cruise;
     const float p_px_v_next_cruise = t26 - t39 * t28;
     kf->modes.cruise.P[3] = p_px_v_next_cruise;
     const float p_py_v_next_cruise = t27 - t40 * t28;
     kf->modes.cruise.P[4] = p_py_v_next_cruise;
-    const float p_v_v_cruise = kf->modes.cruise.P[5];
-    const float p_v_v_next_cruise = p_v_v_cruise - t14 * t7 - t41 * t28;
+    const float p_v_v_next_cruise = kf->modes.cruise.P[5] - t14 * t7 - t41 * t28;
+    const uint32_t signs_cruise_2 = signs_cruise_1 | maneuver_sign_bit(p_v_v_next_cruise);
     kf->modes.cruise.P[5] = p_v_v_next_cruise;
     const float p_px_th_next_cruise = t29 - t39 * t31;
     kf->modes.cruise.P[6] = p_px_th_next_cruise;
     const float p_py_th_next_cruise = t30 - t40 * t31;
     kf->modes.cruise.P[7] = p_py_th_next_cruise;
-    const float p_v_th_cruise = kf->modes.cruise.P[8];
-    const float p_v_th_next_cruise = p_v_th_cruise - t14 * t8 - t41 * t31;
+    const float p_v_th_next_cruise = kf->modes.cruise.P[8] - t14 * t8 - t41 * t31;
     kf->modes.cruise.P[8] = p_v_th_next_cruise;
-    const float p_th_th_cruise = kf->modes.cruise.P[9];
-    const float p_th_th_next_cruise = p_th_th_cruise - t15 * t8 - t42 * t31;
+    const float p_th_th_next_cruise = kf->modes.cruise.P[9] - t15 * t8 - t42 * t31;
+    const uint32_t signs_cruise_3 = signs_cruise_2 | maneuver_sign_bit(p_th_th_next_cruise);
     kf->modes.cruise.P[9] = p_th_th_next_cruise;
     const float p_px_a_next_cruise = t32 - t39 * t34;
     kf->modes.cruise.P[10] = p_px_a_next_cruise;
     const float p_py_a_next_cruise = t33 - t40 * t34;
     kf->modes.cruise.P[11] = p_py_a_next_cruise;
-    const float p_v_a_cruise = kf->modes.cruise.P[12];
-    const float p_v_a_next_cruise = p_v_a_cruise - t14 * t9 - t41 * t34;
+    const float p_v_a_next_cruise = kf->modes.cruise.P[12] - t14 * t9 - t41 * t34;
     kf->modes.cruise.P[12] = p_v_a_next_cruise;
-    const float p_th_a_cruise = kf->modes.cruise.P[13];
-    const float p_th_a_next_cruise = p_th_a_cruise - t15 * t9 - t42 * t34;
+    const float p_th_a_next_cruise = kf->modes.cruise.P[13] - t15 * t9 - t42 * t34;
     kf->modes.cruise.P[13] = p_th_a_next_cruise;
-    const float p_a_a_cruise = kf->modes.cruise.P[14];
-    const float p_a_a_next_cruise = p_a_a_cruise - t16 * t9 - t43 * t34;
+    const float p_a_a_next_cruise = kf->modes.cruise.P[14] - t16 * t9 - t43 * t34;
+    const uint32_t signs_cruise_4 = signs_cruise_3 | maneuver_sign_bit(p_a_a_next_cruise);
     kf->modes.cruise.P[14] = p_a_a_next_cruise;
     const float p_px_w_next_cruise = t35 - t39 * t37;
     kf->modes.cruise.P[15] = p_px_w_next_cruise;
     const float p_py_w_next_cruise = t36 - t40 * t37;
     kf->modes.cruise.P[16] = p_py_w_next_cruise;
-    const float p_v_w_cruise = kf->modes.cruise.P[17];
-    const float p_v_w_next_cruise = p_v_w_cruise - t14 * t10 - t41 * t37;
+    const float p_v_w_next_cruise = kf->modes.cruise.P[17] - t14 * t10 - t41 * t37;
     kf->modes.cruise.P[17] = p_v_w_next_cruise;
-    const float p_th_w_cruise = kf->modes.cruise.P[18];
-    const float p_th_w_next_cruise = p_th_w_cruise - t15 * t10 - t42 * t37;
+    const float p_th_w_next_cruise = kf->modes.cruise.P[18] - t15 * t10 - t42 * t37;
     kf->modes.cruise.P[18] = p_th_w_next_cruise;
-    const float p_a_w_cruise = kf->modes.cruise.P[19];
-    const float p_a_w_next_cruise = p_a_w_cruise - t16 * t10 - t43 * t37;
+    const float p_a_w_next_cruise = kf->modes.cruise.P[19] - t16 * t10 - t43 * t37;
     kf->modes.cruise.P[19] = p_a_w_next_cruise;
-    const float p_w_w_cruise = kf->modes.cruise.P[20];
-    const float p_w_w_next_cruise = p_w_w_cruise - t17 * t10 - t44 * t37;
+    const float p_w_w_next_cruise = kf->modes.cruise.P[20] - t17 * t10 - t44 * t37;
+    const uint32_t signs_cruise_5 = signs_cruise_4 | maneuver_sign_bit(p_w_w_next_cruise);
     kf->modes.cruise.P[20] = p_w_w_next_cruise;
 
     /* speed: store */
@@ -1199,56 +1248,52 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->modes.speed.x[MANEUVER_A] = a_next_speed;
     kf->modes.speed.x[MANEUVER_W] = w_next_speed;
     const float p_px_px_next_speed = t69 - t87 * t71;
+    const uint32_t signs_speed = maneuver_sign_bit(p_px_px_next_speed);
     kf->modes.speed.P[0] = p_px_px_next_speed;
     const float p_px_py_next_speed = t70 - t87 * t73;
     kf->modes.speed.P[1] = p_px_py_next_speed;
     const float p_py_py_next_speed = t72 - t88 * t73;
+    const uint32_t signs_speed_1 = signs_speed | maneuver_sign_bit(p_py_py_next_speed);
     kf->modes.speed.P[2] = p_py_py_next_speed;
     const float p_px_v_next_speed = t74 - t87 * t76;
     kf->modes.speed.P[3] = p_px_v_next_speed;
     const float p_py_v_next_speed = t75 - t88 * t76;
     kf->modes.speed.P[4] = p_py_v_next_speed;
-    const float p_v_v_speed = kf->modes.speed.P[5];
-    const float p_v_v_next_speed = p_v_v_speed - t62 * t55 - t89 * t76;
+    const float p_v_v_next_speed = kf->modes.speed.P[5] - t62 * t55 - t89 * t76;
+    const uint32_t signs_speed_2 = signs_speed_1 | maneuver_sign_bit(p_v_v_next_speed);
     kf->modes.speed.P[5] = p_v_v_next_speed;
     const float p_px_th_next_speed = t77 - t87 * t79;
     kf->modes.speed.P[6] = p_px_th_next_speed;
     const float p_py_th_next_speed = t78 - t88 * t79;
     kf->modes.speed.P[7] = p_py_th_next_speed;
-    const float p_v_th_speed = kf->modes.speed.P[8];
-    const float p_v_th_next_speed = p_v_th_speed - t62 * t56 - t89 * t79;
+    const float p_v_th_next_speed = kf->modes.speed.P[8] - t62 * t56 - t89 * t79;
     kf->modes.speed.P[8] = p_v_th_next_speed;
-    const float p_th_th_speed = kf->modes.speed.P[9];
-    const float p_th_th_next_speed = p_th_th_speed - t63 * t56 - t90 * t79;
+    const float p_th_th_next_speed = kf->modes.speed.P[9] - t63 * t56 - t90 * t79;
+    const uint32_t signs_speed_3 = signs_speed_2 | maneuver_sign_bit(p_th_th_next_speed);
     kf->modes.speed.P[9] = p_th_th_next_speed;
     const float p_px_a_next_speed = t80 - t87 * t82;
     kf->modes.speed.P[10] = p_px_a_next_speed;
     const float p_py_a_next_speed = t81 - t88 * t82;
     kf->modes.speed.P[11] = p_py_a_next_speed;
-    const float p_v_a_speed = kf->modes.speed.P[12];
-    const float p_v_a_next_speed = p_v_a_speed - t62 * t57 - t89 * t82;
+    const float p_v_a_next_speed = kf->modes.speed.P[12] - t62 * t57 - t89 * t82;
     kf->modes.speed.P[12] = p_v_a_next_speed;
-    const float p_th_a_speed = kf->modes.speed.P[13];
-    const float p_th_a_next_speed = p_th_a_speed - t63 * t57 - t90 * t82;
+    const float p_th_a_next_speed = kf->modes.speed.P[13] - t63 * t57 - t90 * t82;
     kf->modes.speed.P[13] = p_th_a_next_speed;
-    const float p_a_a_speed = kf->modes.speed.P[14];
-    const float p_a_a_next_speed = p_a_a_speed - t64 * t57 - t91 * t82;
+    const float p_a_a_next_speed = kf->modes.speed.P[14] - t64 * t57 - t91 * t82;
+    const uint32_t signs_speed_4 = signs_speed_3 | maneuver_sign_bit(p_a_a_next_speed);
     kf->modes.speed.P[14] = p_a_a_next_speed;
     const float p_px_w_next_speed = t83 - t87 * t85;
     kf->modes.speed.P[15] = p_px_w_next_speed;
     const float p_py_w_next_speed = t84 - t88 * t85;
     kf->modes.speed.P[16] = p_py_w_next_speed;
-    const float p_v_w_speed = kf->modes.speed.P[17];
-    const float p_v_w_next_speed = p_v_w_speed - t62 * t58 - t89 * t85;
+    const float p_v_w_next_speed = kf->modes.speed.P[17] - t62 * t58 - t89 * t85;
     kf->modes.speed.P[17] = p_v_w_next_speed;
-    const float p_th_w_speed = kf->modes.speed.P[18];
-    const float p_th_w_next_speed = p_th_w_speed - t63 * t58 - t90 * t85;
+    const float p_th_w_next_speed = kf->modes.speed.P[18] - t63 * t58 - t90 * t85;
     kf->modes.speed.P[18] = p_th_w_next_speed;
-    const float p_a_w_speed = kf->modes.speed.P[19];
-    const float p_a_w_next_speed = p_a_w_speed - t64 * t58 - t91 * t85;
+    const float p_a_w_next_speed = kf->modes.speed.P[19] - t64 * t58 - t91 * t85;
     kf->modes.speed.P[19] = p_a_w_next_speed;
-    const float p_w_w_speed = kf->modes.speed.P[20];
-    const float p_w_w_next_speed = p_w_w_speed - t65 * t58 - t92 * t85;
+    const float p_w_w_next_speed = kf->modes.speed.P[20] - t65 * t58 - t92 * t85;
+    const uint32_t signs_speed_5 = signs_speed_4 | maneuver_sign_bit(p_w_w_next_speed);
     kf->modes.speed.P[20] = p_w_w_next_speed;
 
     /* turn: store */
@@ -1259,56 +1304,52 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->modes.turn.x[MANEUVER_A] = a_next_turn;
     kf->modes.turn.x[MANEUVER_W] = w_next_turn;
     const float p_px_px_next_turn = t117 - t135 * t119;
+    const uint32_t signs_turn = maneuver_sign_bit(p_px_px_next_turn);
     kf->modes.turn.P[0] = p_px_px_next_turn;
     const float p_px_py_next_turn = t118 - t135 * t121;
     kf->modes.turn.P[1] = p_px_py_next_turn;
     const float p_py_py_next_turn = t120 - t136 * t121;
+    const uint32_t signs_turn_1 = signs_turn | maneuver_sign_bit(p_py_py_next_turn);
     kf->modes.turn.P[2] = p_py_py_next_turn;
     const float p_px_v_next_turn = t122 - t135 * t124;
     kf->modes.turn.P[3] = p_px_v_next_turn;
     const float p_py_v_next_turn = t123 - t136 * t124;
     kf->modes.turn.P[4] = p_py_v_next_turn;
-    const float p_v_v_turn = kf->modes.turn.P[5];
-    const float p_v_v_next_turn = p_v_v_turn - t110 * t103 - t137 * t124;
+    const float p_v_v_next_turn = kf->modes.turn.P[5] - t110 * t103 - t137 * t124;
+    const uint32_t signs_turn_2 = signs_turn_1 | maneuver_sign_bit(p_v_v_next_turn);
     kf->modes.turn.P[5] = p_v_v_next_turn;
     const float p_px_th_next_turn = t125 - t135 * t127;
     kf->modes.turn.P[6] = p_px_th_next_turn;
     const float p_py_th_next_turn = t126 - t136 * t127;
     kf->modes.turn.P[7] = p_py_th_next_turn;
-    const float p_v_th_turn = kf->modes.turn.P[8];
-    const float p_v_th_next_turn = p_v_th_turn - t110 * t104 - t137 * t127;
+    const float p_v_th_next_turn = kf->modes.turn.P[8] - t110 * t104 - t137 * t127;
     kf->modes.turn.P[8] = p_v_th_next_turn;
-    const float p_th_th_turn = kf->modes.turn.P[9];
-    const float p_th_th_next_turn = p_th_th_turn - t111 * t104 - t138 * t127;
+    const float p_th_th_next_turn = kf->modes.turn.P[9] - t111 * t104 - t138 * t127;
+    const uint32_t signs_turn_3 = signs_turn_2 | maneuver_sign_bit(p_th_th_next_turn);
     kf->modes.turn.P[9] = p_th_th_next_turn;
     const float p_px_a_next_turn = t128 - t135 * t130;
     kf->modes.turn.P[10] = p_px_a_next_turn;
     const float p_py_a_next_turn = t129 - t136 * t130;
     kf->modes.turn.P[11] = p_py_a_next_turn;
-    const float p_v_a_turn = kf->modes.turn.P[12];
-    const float p_v_a_next_turn = p_v_a_turn - t110 * t105 - t137 * t130;
+    const float p_v_a_next_turn = kf->modes.turn.P[12] - t110 * t105 - t137 * t130;
     kf->modes.turn.P[12] = p_v_a_next_turn;
-    const float p_th_a_turn = kf->modes.turn.P[13];
-    const float p_th_a_next_turn = p_th_a_turn - t111 * t105 - t138 * t130;
+    const float p_th_a_next_turn = kf->modes.turn.P[13] - t111 * t105 - t138 * t130;
     kf->modes.turn.P[13] = p_th_a_next_turn;
-    const float p_a_a_turn = kf->modes.turn.P[14];
-    const float p_a_a_next_turn = p_a_a_turn - t112 * t105 - t139 * t130;
+    const float p_a_a_next_turn = kf->modes.turn.P[14] - t112 * t105 - t139 * t130;
+    const uint32_t signs_turn_4 = signs_turn_3 | maneuver_sign_bit(p_a_a_next_turn);
     kf->modes.turn.P[14] = p_a_a_next_turn;
     const float p_px_w_next_turn = t131 - t135 * t133;
     kf->modes.turn.P[15] = p_px_w_next_turn;
     const float p_py_w_next_turn = t132 - t136 * t133;
     kf->modes.turn.P[16] = p_py_w_next_turn;
-    const float p_v_w_turn = kf->modes.turn.P[17];
-    const float p_v_w_next_turn = p_v_w_turn - t110 * t106 - t137 * t133;
+    const float p_v_w_next_turn = kf->modes.turn.P[17] - t110 * t106 - t137 * t133;
     kf->modes.turn.P[17] = p_v_w_next_turn;
-    const float p_th_w_turn = kf->modes.turn.P[18];
-    const float p_th_w_next_turn = p_th_w_turn - t111 * t106 - t138 * t133;
+    const float p_th_w_next_turn = kf->modes.turn.P[18] - t111 * t106 - t138 * t133;
     kf->modes.turn.P[18] = p_th_w_next_turn;
-    const float p_a_w_turn = kf->modes.turn.P[19];
-    const float p_a_w_next_turn = p_a_w_turn - t112 * t106 - t139 * t133;
+    const float p_a_w_next_turn = kf->modes.turn.P[19] - t112 * t106 - t139 * t133;
     kf->modes.turn.P[19] = p_a_w_next_turn;
-    const float p_w_w_turn = kf->modes.turn.P[20];
-    const float p_w_w_next_turn = p_w_w_turn - t113 * t106 - t140 * t133;
+    const float p_w_w_next_turn = kf->modes.turn.P[20] - t113 * t106 - t140 * t133;
+    const uint32_t signs_turn_5 = signs_turn_4 | maneuver_sign_bit(p_w_w_next_turn);
     kf->modes.turn.P[20] = p_w_w_next_turn;
 
     /* store: the bank */
@@ -1326,6 +1367,15 @@ maneuver_status_t maneuver_update_radar(maneuver_t *kf, const maneuver_radar_t *
     kf->modes.speed.nis = nis_speed;
     kf->modes.turn.nis = nis_turn;
     kf->nis = t145;
+    if (signs_cruise_5 != 0u) {
+        flags |= maneuver_settle(kf->modes.cruise.P, 0);
+    }
+    if (signs_speed_5 != 0u) {
+        flags |= maneuver_settle(kf->modes.speed.P, 0);
+    }
+    if (signs_turn_5 != 0u) {
+        flags |= maneuver_settle(kf->modes.turn.P, 0);
+    }
     return flags;
 }
 
@@ -1507,4 +1557,4 @@ void maneuver_get_covariance(const maneuver_t *kf, maneuver_real_t P[36])
         }
     }
 }
-/* kfgen: body a34510ef79879bbc6efa979c0a25a384 */
+/* kfgen: body eaf320eb92b958b4e842abbefea51037 */

@@ -128,7 +128,7 @@ maneuver_status_t maneuver_init(maneuver_t *kf);
  * Advance the estimate by one step of 1 s.
  *
  * @param kf  filter
- * @return MANEUVER_OK, or an error that leaves *kf as it was
+ * @return MANEUVER_OK, MANEUVER_REGULARIZED, or an error that leaves *kf as it was
  *
  * 464 mul, 451 add, 6 div, 11 compare, 3 cos, 20 select, 3 sin, 15 wrap.
  */
@@ -139,7 +139,8 @@ maneuver_status_t maneuver_predict(maneuver_t *kf);
  *
  * @param kf  filter
  * @param z   range [m], bearing [rad]
- * @return MANEUVER_OK, MANEUVER_ANOMALY, MANEUVER_GATED, or an error that leaves *kf as it was
+ * @return MANEUVER_OK, MANEUVER_ANOMALY, MANEUVER_REGULARIZED, MANEUVER_GATED, or an error that
+ *     leaves *kf as it was
  *
  * 340 mul, 319 add, 17 div, 3 sqrt, 3 atan2, 23 compare, 3 exp, 6 log, 3 max, 2 min, 14 select,
  *
@@ -178,4 +179,4 @@ void maneuver_get_covariance(const maneuver_t *kf, maneuver_real_t P[36]);
 #endif
 
 #endif
-/* kfgen: body b7085a49f2ef3f5ea6b2d8811636bf0e */
+/* kfgen: body 14536ecaeccddeeb69ae5b7b44cc762b */

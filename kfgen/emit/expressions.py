@@ -85,6 +85,12 @@ class Expressions:
                 if node.args[0].constant is not None:  # read as x > 0, not 0 < x
                     return f"{b} {_COMPARE[node.op].replace('<', '>')} {a}", _RELATION
                 return f"{a} {_COMPARE[node.op]} {b}{'u' if _counts(node.args[0]) else ''}", _RELATION
+            case "signs":
+                self.helpers.add("sign_bit")
+                text = f"{self.prefix}_sign_bit({e(node.args[-1])})"
+                return (text, _ATOM) if len(node.args) == 1 else (f"{e(node.args[0], _ATOM)} | {text}", _OR)
+            case "some":
+                return f"{e(node.args[0], _ATOM)} != 0u", _RELATION
             case "and":
                 return f"{e(node.args[0], _AND)} && {e(node.args[1], _RELATION)}", _AND
             case "or":

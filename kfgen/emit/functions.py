@@ -13,7 +13,7 @@ from kfgen.emit.text import WIDTH, comment, fill, with_unit
 from kfgen.filters.base import FilterCode
 from kfgen.ir.count import operations
 from kfgen.ir.nodes import Constants, Table
-from kfgen.ir.program import Argument, Flag, Function, Guard, walk
+from kfgen.ir.program import Argument, Function, Guard, flags_of, walk
 from kfgen.scalars import Scalar
 
 
@@ -43,9 +43,9 @@ class FunctionMaker:
 
     def make(self, f: Function) -> FunctionView:
         saturates = self.fixed and may_saturate(f)
-        has_flags = saturates or any(isinstance(s, Flag) for s in walk(f.body))
+        has_flags = saturates or bool(flags_of(f.body))
         printer = Printer(self.name, self.scalar, self._index_name, self.tables)
-        if f.private:
+        if f.private and f.returns == "void":
             printer.status = "flags"
         body = printer.statements(with_entries(f.body, self.entries, self.taken, self.name))
         self.helpers |= printer.helpers
@@ -94,7 +94,7 @@ class FunctionMaker:
         test = " || ".join(f"{a.name} == NULL" for a in f.arguments if a.pointer)
         leave = "return;" if f.returns == "void" else f"return {self.NAME}_NULL_ARGUMENT;"
         opening = [] if f.private else [f"if ({test}) {{ {leave} }}"]
-        if has_flags and not f.private:
+        if has_flags and f.returns == "status":
             opening.append(f"{self.name}_status_t flags = {self.NAME}_OK;")
         text = "\n".join(body)
         opening += [f"(void){a.name};" for a in f.arguments if f.private and not re.search(rf"\b{a.name}\b", text)]
@@ -117,7 +117,7 @@ class FunctionMaker:
         return tuple(out)
 
     def _outcome(self, f: Function, saturates: bool) -> str:
-        flags = sorted({s.flag for s in walk(f.body) if isinstance(s, Flag)})
+        flags = sorted(flags_of(f.body))
         flags += ["SATURATED"] if saturates else []
         flags += sorted({s.status for s in walk(f.body) if isinstance(s, Guard) and s.status == "GATED"})
         text = f"{self.NAME}_OK" + "".join(f", {self.NAME}_{flag}" for flag in flags)

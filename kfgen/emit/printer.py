@@ -20,6 +20,7 @@ from kfgen.ir.program import (
     Statement,
     Store,
 )  # fmt: skip
+from kfgen.ir.trace import RAISED
 
 
 class Printer(Expressions):
@@ -41,7 +42,7 @@ class Printer(Expressions):
             case Section(text=text):
                 return comment(text, depth)
             case Let(node=node, name=name, point=point):
-                kind = {"real": real, "bool": "bool", "int": "int", "long": "int64_t"}[node.kind]
+                kind = {"real": real, "bool": "bool", "int": "int", "bits": "uint32_t", "long": "int64_t"}[node.kind]
                 return _noted(wrapped(f"const {kind} {name} = {e(node)};", depth), depth, point)
             case Declare(name=name, size=size, value=value, kind=kind, point=point):
                 c_kind = real if kind == "real" else kind
@@ -58,8 +59,10 @@ class Printer(Expressions):
                     target += f"[{self.index(name, index)}]"
                 return wrapped(f"{target} = {e(node)};", depth)
             case Guard(condition=condition, status=status, before=before, why=why):
-                returned = f"{self.prefix.upper()}_{status}"
+                returned = status if status == RAISED else f"{self.prefix.upper()}_{status}"
                 body = [line for store in before for line in self._statement(store, depth + 1)]
+                if condition.constant is not None:  # known to hold
+                    return [line[4:] for line in body] + ["    " * depth + f"return {returned};"]
                 body += ["    " * (depth + 1) + f"return {returned};"]
                 head = wrapped(f"if ({e(condition)}) {{" + (f" /* {why} */" if why else ""), depth)
                 one_line = f"{head[0]} {body[0].strip()} }}"
@@ -68,7 +71,8 @@ class Printer(Expressions):
                 return head + body + ["    " * depth + "}"]
             case Call(callee=callee, args=args):
                 given = [self._argument(a) for a in args]
-                return wrapped(f"{self.prefix}_{callee.name}({', '.join(given)});", depth)
+                told = "flags |= " if callee.returns == "status" else ""
+                return wrapped(f"{told}{self.prefix}_{callee.name}({', '.join(given)});", depth)
             case Flag(condition=condition, flag=flag) if condition.constant is not None:
                 return ["    " * depth + f"flags |= {self.prefix.upper()}_{flag};"]
             case Flag(condition=condition, flag=flag):

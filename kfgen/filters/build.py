@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
@@ -154,7 +154,8 @@ def _form(model: Model, scalar: Scalar, order: list[int] | None = None) -> Form[
             return list(range(n))
         return _order((model,)) if order is None else order
 
-    choice = Choice(n, chosen.update, scalar.epsilon, ordered, lambda inner: _gain_change(model, inner))
+    change = partial(_gain_change, model)
+    choice = Choice(n, chosen.update, scalar.epsilon, not scalar.uniform, ordered, change)
     return straight(chosen.covariance, choice)
 
 
@@ -228,7 +229,7 @@ def _order(models: tuple[Model, ...]) -> list[int]:
 
 def _private_words(spec: Spec, scalar: Scalar) -> set[str]:
     """What follows the filter's name in the names of its helpers, private functions and tables."""
-    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach", "draws"}
+    words = {*scalar.helper_ops, "order", "wm", "wc", "f", "absorb", "reach", "draws", "settle"}
     words |= {f"{kind}_{sensor.name}" for kind in ("h", "see", "recall") for sensor in spec.measurements}
     modes = spec.imm.modes if spec.imm else ()
     return words | {f"{word}_{mode.name}" for word in words for mode in modes}

@@ -10,13 +10,13 @@ from kfgen.ir.program import Call, For, If, Statement, roots
 _FREE = {"const", "field", "element", "read", "variable", "counter", "real", "neg", "half", "finite", "bit", "lookup",
          "q_count", "q_fit", "table_x", "table_y", "table_slope"}
 _NAMES = {"lt": "compare", "le": "compare", "q_reciprocal": "div"}
-_SILENT = {"and", "or", "not"}
+_SILENT = {"and", "or", "not", "signs", "some"}
 
 
 def operations(body: list[Statement]) -> dict[str, int] | None:
     """Operation -> how often one call executes it, in a fixed order; None where that depends on the run.
 
-    A sum of k terms is k - 1 add; its products are mul.
+    A sum of k terms is k - 1 add; its products are mul. What is rare does not count, but for its condition.
     """
     counts: Counter[str] = Counter()
     if not _tally(body, 1, counts):
@@ -29,7 +29,7 @@ def operations(body: list[Statement]) -> dict[str, int] | None:
 def _tally(body: list[Statement], times: int, counts: Counter[str]) -> bool:
     """Add what `times` executions of the statements take; False where a loop has no fixed length."""
     for statement in body:
-        if isinstance(statement, If):
+        if isinstance(statement, If) and not statement.rare:
             return False
         if isinstance(statement, For):
             start, stop = statement.start.constant, statement.stop.constant

@@ -119,7 +119,7 @@ def _expression(root: Node, counts: Counter[str], constants: set[Node], loads: s
             counts["select"] += _SELECTIONS[op]
         elif op == "abs":
             counts["term"] += 1
-        elif op in ("lt", "le", "and", "or", "not", "bit"):
+        elif op in ("lt", "le", "and", "or", "not", "bit", "signs", "some"):
             counts["compare"] += 1
         elif op not in _FREE:
             counts[op] += 1  # div, sqrt, neg, abs, select, finite, ...

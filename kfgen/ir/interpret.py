@@ -25,6 +25,7 @@ from kfgen.ir.program import (
     Statement,
     Store,
 )  # fmt: skip
+from kfgen.ir.trace import RAISED
 from kfgen.scalars.base import Scalar
 
 
@@ -47,6 +48,8 @@ def run(function: Function, scalar: Scalar, memory: Memory) -> set[str]:
     try:
         machine.block(function.body)
     except _Return as result:
+        if result.status == RAISED:
+            return machine.flags
         return {result.status} - {"OK"}  # an error comes alone, and so does a refusal: nothing has been done
     return machine.flags
 
@@ -107,7 +110,9 @@ class _Machine:
                     parts.append((argument.name, whole, start))
             elif isinstance(given, Node):  # `kf`, `u`, `flags` are at hand
                 memory.numbers[argument.name] = self.value(given)
-        _Machine(self.scalar, memory).block(call.callee.body)
+        machine = _Machine(self.scalar, memory)
+        machine.block(call.callee.body)
+        self.flags |= machine.flags
         for name, whole, start in parts:
             result = memory.arrays[name]
             whole[start : start + len(result)] = result

@@ -4,7 +4,7 @@ A node is an operation on other nodes. A `Pool` makes them: asking twice for the
 same node, so equal expressions are shared and comparing nodes is comparing identities. Constants are exact
 fractions and are rounded only by whoever prints or runs the program.
 
-Kinds are "real", "bool" and "int" (loop counters and indices).
+Kinds are "real", "bool", "int" (loop counters and indices) and "bits" (a word whose bits are looked at).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from kfgen.ir import constants
 
-REAL, BOOL, INT = "real", "bool", "int"
+REAL, BOOL, INT, BITS = "real", "bool", "int", "bits"
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +227,14 @@ class Pool:
         """A piecewise linear function or its slope; both find the segment once."""
         segment = self.make("segment", (a,), table, INT)
         return self.make("slope", (segment,), table) if slope else self.make("table", (segment, a), table)
+
+    def signs(self, a: Node, before: Node | None) -> Node:
+        """A word that is 0 where the sign bit of a is not set, and `before` is 0."""
+        return self.make("signs", (a,) if before is None else (before, a), kind=BITS)
+
+    def some(self, word: Node) -> Node:
+        """Whether a word is not 0."""
+        return self.make("some", (word,), kind=BOOL)
 
     # truth -----------------------------------------------------------------------------------------
 

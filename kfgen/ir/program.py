@@ -87,10 +87,11 @@ class For:
 
 @dataclass(slots=True)
 class If:
-    """Runs the body where the condition holds; for actions in loops, never for values."""
+    """Runs the body where the condition holds; for actions, never for values. rare: all but never."""
 
     condition: Node
     body: list[Statement]
+    rare: bool = False
 
 
 @dataclass(slots=True)
@@ -103,7 +104,10 @@ class Slice:
 
 @dataclass(slots=True)
 class Call:
-    """A private function of the filter is run. args: `kf` and `u` by name, parts of arrays, numbers."""
+    """A private function of the filter is run. args: `kf` and `u` by name, parts of arrays, numbers.
+
+    The flags of one that returns a status are added to those of the caller.
+    """
 
     callee: Function
     args: list[str | Slice | Node]
@@ -185,6 +189,17 @@ def mapped(statement: Statement, new: Callable[[Node], Node]) -> Statement:
             return replace(statement, args=given)
         case Section():
             return statement
+
+
+def flags_of(body: list[Statement]) -> set[str]:
+    """The warnings that statements may raise, and the functions that they call."""
+    out: set[str] = set()
+    for statement in walk(body):
+        if isinstance(statement, Flag):
+            out.add(statement.flag)
+        elif isinstance(statement, Call) and statement.callee.returns == "status":
+            out |= flags_of(statement.callee.body)
+    return out
 
 
 def walk(body: list[Statement]) -> Iterator[Statement]:

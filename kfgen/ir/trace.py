@@ -7,7 +7,7 @@ fold as it runs, so the algorithm is written in full and what is emitted is what
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -29,6 +29,7 @@ from kfgen.ir.program import (
 from kfgen.ir.recording import Block, RecordingPool
 
 Number = int | Fraction
+RAISED = "flags"  # the status of a guard that returns what has been raised
 
 
 class Value:
@@ -105,6 +106,7 @@ class Trace:
     """The recording of one function."""
 
     in_place = True  # what is loaded is what stands where it will be stored
+    stores = True  # stores are made, and not collected
 
     def __init__(self, smallest: Fraction | int = 0) -> None:
         self.smallest = smallest  # a number not above it counts as zero where it divides
@@ -115,6 +117,7 @@ class Trace:
         self.names: dict[Node, str] = {}
         self.arguments_at: int | None = None  # where in the body what the function is given is tested
         self.needed: dict[str, Value] = {}  # path of something given -> whether it counts, where it does not always
+        self.closings: list[Callable[[], None]] = []  # record what is all but never done, when all else has been
         self.doubts: list[tuple[Value, str]] = []  # conditions under which an assumption made fails, and why
         self.declared: Counter[str] = Counter()
         self.declared_signs: Mapping[str, int] = {}  # of fields, by their path, where a question supposes them
@@ -171,6 +174,10 @@ class Trace:
         """An entry of a table of constants."""
         return self.wrapped(self.pool.make("lookup", (index.node,), Constants(values, name)))
 
+    def sign(self, value: Value, before: Value | None) -> Value:
+        """A word that is not 0 where the sign bit of a number is set, or `before` is not 0: a test without a branch."""
+        return self.name(self.wrapped(self.pool.signs(value.node, None if before is None else before.node)), "signs")
+
     def bit(self, path: str, place: int) -> Value:
         """Whether a bit of an integer argument is set."""
         return self.wrapped(self.pool.make("bit", (), (path, place), BOOL))
@@ -194,6 +201,10 @@ class Trace:
         if condition.constant == 0:
             return
         self.block.items.append(Guard(condition.node, status, before or [], why))
+
+    def leave(self) -> None:
+        """End here, with the flags that have been raised."""
+        self.block.items.append(Guard(self.pool.boolean(True), RAISED))
 
     def flag(self, condition: Value, flag: str) -> None:
         """Warn with this flag where the condition holds."""
@@ -226,6 +237,10 @@ class Trace:
         self.block.items.append(Declare(name, None, self.node(value)))
         return Variable(self, name)
 
+    def later(self, closing: Callable[[], None]) -> None:
+        """Record something in the end."""
+        self.closings.append(closing)
+
     @contextmanager
     def loop(self, variable: str, start: int | Value, stop: int | Value, down: bool = False) -> Iterator[Value]:
         """A loop over variable = start .. stop - 1 (downwards if asked); yields the counter."""
@@ -236,8 +251,9 @@ class Trace:
             yield self.wrapped(counter)
 
     @contextmanager
-    def when(self, condition: Value) -> Iterator[None]:
-        with self._scope(If(condition.node, [])):
+    def when(self, condition: Value, rare: bool = False) -> Iterator[None]:
+        """What is done where the condition holds. rare: all but never."""
+        with self._scope(If(condition.node, [], rare)):
             yield
 
     @contextmanager

@@ -105,8 +105,8 @@ def sequential(P: Matrix, H: Matrix, R: Matrix, y: Vector, rules: Rules = PLAIN)
     * K = P h^T / s, held at 0 for considered states (Schmidt 1966), limited; P in Joseph's form with that K.
 
     A component with r = 0 along a direction that is already known exactly (c = 0 to round-off) is skipped,
-    unless there is a floor: it adds nothing to nis, to the likelihood, or to the flags. A variance c below
-    that raises NOT_POSITIVE.
+    unless there is a floor: it adds nothing to nis, to the likelihood, or to the flags. A variance c below 0 is
+    rounding, and counts as 0.
     """
     U, variances = udu(R)
     rows = np.linalg.solve(U, H)
@@ -118,8 +118,6 @@ def sequential(P: Matrix, H: Matrix, R: Matrix, y: Vector, rules: Rules = PLAIN)
     for h, r, innovation in zip(rows, map(float, variances), innovations, strict=True):
         known = 8.0 * len(P) * EPS * float(np.abs(h) @ np.abs(P) @ np.abs(h))
         c = float(h @ P @ h)
-        if c < -known:
-            raise StepError(Status.NOT_POSITIVE)
         if r == 0.0 and c <= known and rules.floor == 0.0:
             continue
         # within round-off of 0 the variance of h x is 0: what is left of it must not become a gain

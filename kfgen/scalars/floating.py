@@ -18,7 +18,7 @@ class Floating:
     """An IEEE 754 type."""
 
     helpers = "helpers/float.j2"
-    helper_ops = frozenset({"finite", "wrap", "segment", "min", "max", "sign"})
+    helper_ops = frozenset({"finite", "wrap", "segment", "min", "max", "sign", "sign_bit"})
     silent_ops: frozenset[str] = frozenset()
     uniform = True
 
@@ -138,6 +138,8 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "segment": _segment,
     "slope": lambda s, table, i: s.convert(table.slopes()[i]),
     "finite": lambda s, d, a: bool(a - a >= 0),
+    "signs": lambda s, d, *args: int(np.signbit(args[-1])) | (args[0] if len(args) > 1 else 0),
+    "some": lambda s, d, a: a != 0,
     "lt": lambda s, d, a, b: bool(a < b),
     "le": lambda s, d, a, b: bool(a <= b),
     "and": lambda s, d, a, b: a and b,

@@ -18,7 +18,7 @@ from kfgen.spec.types import Spec
 from tests.oracle import problems
 
 # of chain16: instructions of one predict and one update, bytes of flash; bytes of stack with 16 states
-CEILINGS = {("ud", "bierman"): (17000, 2290), ("full", "standard"): (9500, 2560)}
+CEILINGS = {("ud", "bierman"): (17000, 2290), ("full", "standard"): (9950, 2700)}
 STACK = 1536
 OTHERS = [("ud", "joseph", "consider: [v3], gain_limit: 0.9"), ("full", "joseph", "adaptive: true, robust: huber"),
           ("sqrt", None, "")]  # fmt: skip
@@ -55,7 +55,7 @@ def test_ceilings(form):
 def test_stack_and_size_of_the_others(covariance, update, options):
     found = cost(16, covariance, update, "none", options)
     assert found.stack <= STACK
-    assert found.flash <= 4096
+    assert found.flash <= 4224
 
 
 @pytest.mark.usefixtures("_tools")

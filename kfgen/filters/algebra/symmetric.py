@@ -55,17 +55,20 @@ class Symmetric:
 
         return Symmetric(self.n, entry)
 
-    def joseph(self, measurement: Measurement, c: Vector, K: Vector, changed: bool = False) -> Symmetric:
+    def joseph(
+        self, measurement: Measurement, c: Vector, K: Vector, changed: bool = False, lift: Number = 0
+    ) -> Symmetric:
         """(I - g K h) P (I - g K h)^T + g r K K^T for any gain: A = (I - g K h) P, then A - g (A h^T - r K) K^T.
 
-        c: P h^T. changed: K is not the optimal gain.
+        c: P h^T. changed: K is not the optimal gain. lift: what comes to r in the variances of states that are not
+        themselves measured.
         """
         h, r, g = measurement.h, measurement.r, measurement.g
         weighted = [times(g, k) for k in K]
         seen = [j for j, x in enumerate(h) if not is_zero(x)]
         # a state that is measured exactly is known exactly, not up to rounding
-        exact = len(seen) == 1 and is_constant(h[seen[0]]) and is_zero(r) and is_one(g) and not changed
-        known = seen[0] if exact else -1
+        single = seen[0] if len(seen) == 1 and is_constant(h[seen[0]]) else -1
+        known = single if is_zero(r) and is_one(g) and not changed else -1
 
         def partial(i: int, j: int) -> Number:
             return self[i, j] if is_zero(K[i]) or is_zero(c[j]) else self[i, j] - weighted[i] * c[j]
@@ -79,7 +82,9 @@ class Symmetric:
             if known in (i, j):
                 return self[i, j] * 0
             a = partial(i, j)
-            return a if is_zero(rest[i]) or is_zero(K[j]) else a + rest[i] * weighted[j]
+            if is_zero(rest[i]) or is_zero(K[j]):
+                return a
+            return a + (plus(rest[i], times(K[i], lift)) if i == j != single else rest[i]) * weighted[j]
 
         return Symmetric(self.n, entry)
 

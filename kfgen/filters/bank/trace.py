@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -51,9 +51,19 @@ class BankTrace(Trace):
     @contextmanager
     def capture(self) -> Iterator[dict[str, dict[int, Value]]]:
         """Stores are not made but collected, as path -> index -> value."""
-        self.captured = {}
+        self.captured, self.stores = {}, False
         yield self.captured
-        self.captured = None
+        self.captured, self.stores = None, True
+
+    def later(self, closing: Callable[[], None]) -> None:
+        scope = self.scope
+
+        def scoped() -> None:
+            outer, self.scope = self.scope, scope
+            closing()
+            self.scope = outer
+
+        super().later(scoped)
 
     def materialise(self, scope: Scope, fields: Mapping[str, Mapping[int, Value]]) -> None:
         """Put values that a mode is given into local arrays, which loops can read."""

@@ -97,7 +97,7 @@ class Form(Protocol[P]):
         ...
 
     def variance(self, P: P, h: Vector) -> Number:
-        """h P h^T."""
+        """h P h^T, not below zero."""
         ...
 
     def inflated(self, P: P, a: Number) -> P:
@@ -144,6 +144,10 @@ class Form(Protocol[P]):
 
     def limit_correlations(self, t: Trace) -> None:
         """Of the P that has been stored: |P_ij| <= sqrt(P_ii P_jj)."""
+        ...
+
+    def loosen(self, t: Trace) -> None:
+        """Forget the correlations of the P in the struct, where it was found that rounding has spoilt them."""
         ...
 
     def indefinite(self, P: P, tolerance: Fraction) -> tuple[P, list[Value]]:

@@ -16,5 +16,8 @@ class Definite:
     def bounded(self, t: Trace, P: P, prior: P, share: Value, tolerance: Fraction) -> tuple[P, Value]:
         return P, t.wrapped(t.pool.boolean(False))
 
+    def loosen(self, t: Trace) -> None:
+        """Nothing: it is a square, or has factors that are not negative."""
+
     def limit_correlations(self, t: Trace) -> None:
         return

@@ -22,12 +22,14 @@ from kfgen.filters.covariance.parts import GainChange
 class Choice:
     """What a form is chosen for. n: states. update: of the spec; None: none is chosen, as with sigma points.
 
+    coarse: numbers are of fixed point.
     ordered: gives the cheapest inner order. change: what the spec makes of gains in an inner order.
     """
 
     n: int
     update: str | None
     epsilon: Fraction
+    coarse: bool
     ordered: Callable[[], list[int]]
     change: Callable[[list[int]], GainChange | None]
 

@@ -64,14 +64,16 @@ class Learnt:
 
 @dataclass(frozen=True)
 class VectorGain:
-    """K (n,) of a scalar measurement, s its innovation variance."""
+    """K (n,) of a scalar measurement, s its innovation variance. inverse: 1 / s as the gain has made it."""
 
     K: Vector
     s: Value
     innovation: Callable[[Moved], Value]
-    sound = False
+    inverse: Number | None = None
+    sound: bool = False
+    spoilt: Value | None = None
 
     def applied(self, motion: Moved) -> tuple[Moved, Number]:
         nu = self.innovation(motion)
         motion = motion.by(self.K, nu)
-        return motion, nu * (nu * (1 / self.s))  # the gain has made the reciprocal
+        return motion, nu * (nu * (1 / self.s if self.inverse is None else self.inverse))

@@ -82,7 +82,8 @@ class Scalar:
 class Gain(Protocol):
     """What an update has made of a scalar measurement. s: the innovation variance.
 
-    sound: s > 0 by the way it is computed, where r > 0.
+    sound: s > 0 by the way it is computed, where r > 0. spoilt: condition under which rounding has spoilt the
+    covariance, so that s and the gain are no use; no error, since it can be mended.
     """
 
     @property
@@ -90,6 +91,9 @@ class Gain(Protocol):
 
     @property
     def sound(self) -> bool: ...
+
+    @property
+    def spoilt(self) -> Value | None: ...
 
     def applied(self, motion: Any) -> tuple[Motion, Number]:
         """motion (that of the same form) with K nu, and nu^2 / s."""

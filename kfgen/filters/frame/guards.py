@@ -22,9 +22,11 @@ def arguments(t: Trace, needed: Mapping[str, Value] | None = None) -> None:
 
 
 def settled(t: Trace, model: Model) -> None:
-    """NOT_FINITE at `arguments`, now that the whole function is recorded: each input and parameter by itself, for the
-    sum of large numbers would overflow. A parameter needs no test where a later one shows it, and no other status can
-    come before."""
+    """NOT_FINITE at `arguments`, now that the whole function is recorded, what was left to the end included: each input
+    and parameter by itself, for the sum of large numbers would overflow. A parameter needs no test where a later one
+    shows it, and no other status can come before."""
+    for closing in t.closings:
+        closing()
     assert t.arguments_at is not None, "a function that reads what it is given"
     read = given(item for block in (t.block, *t.blocks.values()) for item in block.items if not isinstance(item, Node))
     seen = {node.data for node in shown_first(t) if node.op == "field"}

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import or_
 from typing import Any
 
 from kfgen.filters.algebra.linalg import Vector, dot, plus
@@ -135,14 +136,14 @@ class Ekf(SingleFilter):
             # nis shows whether z is finite, but for components that may have been skipped
             skippable = [v for v, r in zip(innovation.y, innovation.variances, strict=True) if not is_positive(r)]
             guards.finite(t, [*skippable, *x, result.nis, *evidence, *u.tested], self._entering(innovation, result))
-            guards.positive(t, result.failures)
+            self._positive(u, result)
         elif final is result:
             yield from self.judged(u, innovation, result)
             guards.finite(t, [result.nis, *x, *evidence])
         else:
             guards.doubts(t, x)
             guards.finite(t, [result.nis, *x, *final.s, *evidence], [final.log_likelihood])
-            guards.positive(t, final.failures)
+            self._positive(u, final)
         kept = self.prepared(u, x, P, final.motion)
         yield Made(x, P, result.nis, final.log_likelihood)
         self.store_update(u, x, P, kept)
@@ -206,8 +207,18 @@ class Ekf(SingleFilter):
         t.section("guards")
         guards.doubts(t, [*self._model_values(innovation), *u.tested])
         guards.finite(t, [*innovation.y, *u.tested], self._entering(innovation, plain))
-        guards.positive(t, plain.failures)
+        self._positive(u, plain)
         yield Judged(plain.nis)
+
+    def _positive(self, u: Update, result: Updated[Any]) -> None:
+        """Guards of the innovation variances. Where rounding has made one negative no gain is any good: the measurement
+        is left out, and P such that the next one can be taken."""
+        t = u.t
+        guards.positive(t, result.failures)
+        if result.spoilt:
+            with t.when(reduce(or_, result.spoilt), rare=True):
+                u.form.loosen(t)
+                t.leave()
 
     def prepared(self, u: Update, x: list[Value], P: Any, motion: Motion) -> Learnt:
         """What an update has to say of R and Q."""

@@ -26,7 +26,7 @@ from kfgen.quantiles import chi2_quantile, log_two_pi
 @dataclass(frozen=True)
 class Updated(Generic[P]):
     """After all components. motion: by what the state has moved. s: innovation variances. failures: conditions under
-    which an innovation variance is negative beyond round-off.
+    which an innovation variance is negative beyond round-off. spoilt: those under which round-off has made it so.
     """
 
     motion: Motion
@@ -35,6 +35,7 @@ class Updated(Generic[P]):
     s: list[Value]
     failures: list[Value]
     log_likelihood: Value
+    spoilt: list[Value]
 
 
 def departs(model: Model) -> bool:
@@ -77,6 +78,7 @@ class Sequence(Generic[P]):
         likelihood: Any = 0  # -2 log
         every_s: list[Value] = []
         failures: list[Value] = []
+        spoilt: list[Value] = []
         prior = P  # what rounding leaves is relative to what it was
         exact = [not is_positive(r) and _several(h) for h, r in zip(rows, variances, strict=True)]
         singly = self.singly or any(exact)
@@ -99,9 +101,12 @@ class Sequence(Generic[P]):
                 sure = is_positive(variances[c]) or self.floor is not None
                 if not sure:  # a direction already known, measured exactly: skipped
                     square = t.select(variance > 0, square, 0)
-                    failures.append(variance < -low)
+                    if not gain.sound or form.factored:
+                        failures.append(variance < -low)
                 elif not gain.sound:
                     failures.append(~(variance > 0))
+                if gain.spoilt is not None:
+                    spoilt.append(gain.spoilt)
                 nis = plus(nis, square)
                 if self.model.spec.code.log_likelihood:
                     term = square + t.function("log", variance) + t.value(log_two_pi())
@@ -113,7 +118,7 @@ class Sequence(Generic[P]):
         if self.plain:
             t.section("state and innovation squared")
             nis = t.name(nis, "nis")
-        return Updated(motion, P, nis, every_s, failures, t.value(likelihood) * Fraction(-1, 2))
+        return Updated(motion, P, nis, every_s, failures, t.value(likelihood) * Fraction(-1, 2), spoilt)
 
     def _innovation(self, innovation: Innovation, c: int) -> Callable[[Motion], Value]:
         """y_c less what the components before it have moved."""

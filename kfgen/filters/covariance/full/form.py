@@ -10,7 +10,7 @@ from kfgen.filters.covariance.loops.looped import Looping
 
 def straight(choice: Choice) -> StraightFull:
     change = choice.change(list(range(choice.n)))
-    return StraightFull(choice.n, choice.update or "standard", choice.epsilon, choice.order, change)
+    return StraightFull(choice.n, choice.update or "standard", choice.epsilon, choice.order, change, choice.coarse)
 
 
 def looped(form: StraightFull, how: Looping) -> LoopedFull:

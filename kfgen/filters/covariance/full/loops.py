@@ -14,6 +14,7 @@ from kfgen.filters.algebra.symmetric import Symmetric
 from kfgen.filters.algebra.triangles import upper, upper_size, upper_start
 from kfgen.filters.base import Block
 from kfgen.filters.covariance.full.gather import LoopedEntries, add_noise, indefinite
+from kfgen.filters.covariance.full.rounding import not_negative, single_state
 from kfgen.filters.covariance.full.store import FullStore
 from kfgen.filters.covariance.full.straight import StraightFull, round_off
 from kfgen.filters.covariance.full.terms import PENDING, ArrayEntries, Term
@@ -168,7 +169,8 @@ class LoopedFull(Looped, FullStore):
         return Symmetric(self.n, lambda i, j: P.entry(i, j))
 
     def variance(self, P: ArrayEntries, h: Vector) -> Number:
-        return dot(h, self.entries(P).times(h))
+        spread = dot(h, self.entries(P).times(h))
+        return spread if single_state(h) >= 0 and not P.terms and not P.array else not_negative(spread)
 
     def tolerance(self, P: ArrayEntries, h: Vector) -> Value | int:
         return round_off(self.entries(P), h, self.epsilon)
@@ -226,6 +228,7 @@ class LoopedFull(Looped, FullStore):
     def store(self, t: Trace, P: ArrayEntries, names: list[str], after_predict: bool) -> None:
         if P.array or P.terms:
             P.write("kf.P", lambda place, value: t.store("kf.P", place, value))
+            t.later(lambda: self.settle(t))
 
     # mixtures ----------------------------------------------------------------------------------------
 

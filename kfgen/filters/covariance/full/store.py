@@ -8,8 +8,8 @@ from fractions import Fraction
 from kfgen.filters.algebra.numbers import select, sqrt
 from kfgen.filters.algebra.triangles import upper_size, upper_start
 from kfgen.filters.base import Block
-from kfgen.filters.covariance.kernels.correlations import limit
-from kfgen.filters.covariance.kernels.function import Kernels
+from kfgen.filters.covariance.kernels.correlations import limit, settle
+from kfgen.filters.covariance.kernels.function import Kernels, integer
 from kfgen.filters.covariance.names import entries
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Array, Trace, Value
@@ -30,6 +30,14 @@ class FullStore:
     def limit_correlations(self, t: Trace) -> None:
         """Of the P that has been stored."""
         t.call(limit(self._kernels(t), self.n), [("kf.P", 0)])
+
+    def loosen(self, t: Trace) -> None:
+        """Forget the correlations of the P in the struct."""
+        t.call(settle(self._kernels(t), self.n), [("kf.P", 0), integer(t, 1)])
+
+    def settle(self, t: Trace) -> None:
+        """Variances below zero of the P that has been stored: as large as rounding has left them."""
+        t.call(settle(self._kernels(t), self.n), [("kf.P", 0), integer(t, 0)])
 
     def _kernels(self, t: Trace) -> Kernels:
         if self.shared is None:

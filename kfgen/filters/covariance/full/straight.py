@@ -6,11 +6,30 @@ from fractions import Fraction
 
 from kfgen.filters.algebra.factors import cholesky, factor_columns, indefinite, udu_computed
 from kfgen.filters.algebra.limits import Limits
-from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, quotients, times
+from kfgen.filters.algebra.linalg import Rows, Vector, dot, minus, times
 from kfgen.filters.algebra.measurement import Measurement
-from kfgen.filters.algebra.numbers import Number, is_positive, is_zero, select, sqrt
+from kfgen.filters.algebra.numbers import (
+    Number,
+    assume_nonnegative,
+    is_nonnegative,
+    is_positive,
+    is_zero,
+    reciprocal,
+    select,
+    sqrt,
+)  # fmt: skip
 from kfgen.filters.algebra.symmetric import Symmetric, assembled
 from kfgen.filters.algebra.triangles import upper
+from kfgen.filters.covariance.full.rounding import (
+    UNITS,
+    inverse_of,
+    is_stored,
+    lifting,
+    not_negative,
+    settled,
+    single_state,
+    spoilt_by,
+)
 from kfgen.filters.covariance.full.store import FullStore
 from kfgen.filters.covariance.gather import GatheredEntries
 from kfgen.filters.covariance.loops.partly import EntriesInLoops
@@ -28,18 +47,22 @@ class StraightFull(StraightLine, FullStore):
     group = 1
 
     def __init__(
-        self, n: int, update: str, epsilon: Fraction, sequence: list[int], change: GainChange | None = None
-    ) -> None:
+        self, n: int, update: str, epsilon: Fraction, sequence: list[int], change: GainChange | None = None,
+        coarse: bool = False,
+    ) -> None:  # fmt: skip
         super().__init__(n)
         self.form = update
         self.change = change
         self.epsilon = epsilon
+        self.coarse = coarse  # fixed point: every entry has a format of its own, and none of them can be looped over
         # After a prediction the columns are computed and stored in an order that keeps together what the model
         # couples: few entries of the old P are then still needed when they are overwritten.
         self.sequence = sequence
 
     def plain(self) -> StraightFull:
-        return self if self.change is None else StraightFull(self.n, self.form, self.epsilon, self.sequence)
+        if self.change is None:
+            return self
+        return StraightFull(self.n, self.form, self.epsilon, self.sequence, None, self.coarse)
 
     def load(self, t: Trace) -> Symmetric:
         return Symmetric(self.n, lambda i, j: t.element("kf.P", upper(i, j)))
@@ -57,6 +80,8 @@ class StraightFull(StraightLine, FullStore):
                     p = p + w[i] * d * w[j]
             return p
 
+        for j in range(self.n):
+            assume_nonnegative(P[j, j])
         return P.congruent(F).changed(with_noise)
 
     def update(
@@ -67,24 +92,46 @@ class StraightFull(StraightLine, FullStore):
             measurement = scalar.measurement
             h, r = measurement.h, measurement.r
             c = P.times(h)
-            variance = times(measurement.g, dot(h, c)) + r
-            K = quotients(c, variance, r)
+            spread, direct = dot(h, c), self._is_direct(P, h)
+            bounded = not direct and (self.coarse or not is_positive(r))
+            variance = times(measurement.g, not_negative(spread) if bounded else spread) + r
+            spoilt = None
+            if not bounded and not direct:
+                spoilt = spoilt_by(variance, r) if single_state(h) < 0 else spread < 0
+            if single_state(h) >= 0:  # by a guard
+                assume_nonnegative(P[single_state(h), single_state(h)])
+            K, inverse = self._gain(c, variance, r)
             if self.change is not None:
                 K = self.change(K)
             if self.form == "joseph":
-                P = P.joseph(measurement, c, K, changed=self.change is not None)
+                lift = 0 if self.coarse else times(lifting(variance, r), UNITS * self.epsilon)
+                P = P.joseph(measurement, c, K, self.change is not None, lift)
             else:
                 P = P.downdated(measurement, c, K)
             if not is_positive(r):
                 P = self._clamped(t, P, measurement, K, c)
-            gains.append(VectorGain(K, variance, scalar.innovation))
+            gains.append(VectorGain(K, variance, scalar.innovation, inverse, not direct, spoilt))
         return P, gains
+
+    def _is_direct(self, P: Symmetric, h: Vector) -> bool:
+        """Whether a row measures a variance of the struct: only who has written it there can have made it negative."""
+        state = single_state(h)
+        return state >= 0 and is_stored(P[state, state])
+
+    def _gain(self, c: Vector, s: Value, r: Number) -> tuple[Vector, Number | None]:
+        """c / s, and 1 / s where it is not the plain one."""
+        if self.coarse or self.form == "joseph":
+            inverse = 1 / s if is_positive(r) else reciprocal(s)[1]
+            return [times(x, inverse) for x in c], None
+        plain, inverse = inverse_of(s, r, self.epsilon)
+        return [times(x, inverse) for x in c], plain
 
     def entries(self, P: Symmetric) -> Symmetric:
         return P
 
     def variance(self, P: Symmetric, h: Vector) -> Number:
-        return dot(h, P.times(h))
+        spread = dot(h, P.times(h))
+        return spread if self._is_direct(P, h) else not_negative(spread)
 
     def inflated(self, P: Symmetric, a: Number) -> Symmetric:
         return P.changed(lambda i, j, p: p * a)
@@ -132,13 +179,31 @@ class StraightFull(StraightLine, FullStore):
 
         A standard update needs none beside x: c_i^2 / s <= P_ii (Cauchy and Schwarz) is finite where P was.
         """
-        return [P[i, i] for i in range(self.n)] if after_predict or self.form == "joseph" else []
+        if not (after_predict or self.form == "joseph"):
+            return []
+        return [P[i, i] for i in range(self.n) if self.coarse or not settled(P[i, i])]
 
     def store(self, t: Trace, P: Symmetric, names: list[str], after_predict: bool) -> None:
+        signs: Value | None = None
         for last, j in enumerate(self.sequence if after_predict else range(self.n)):
             for i in self.sequence[: last + 1] if after_predict else range(j + 1):
                 low, high = min(i, j), max(i, j)
-                t.store("kf.P", upper(low, high), t.name(t.value(P[low, high]), entry_next("p", names, low, high)))
+                p = t.value(P[low, high])
+                if i == j and t.stores and not is_nonnegative(p):
+                    if self.coarse:
+                        t.flag(p < 0, "REGULARIZED")
+                        p = select(p < 0, -p, p)
+                    else:
+                        signs = t.sign(p, signs)
+                if not (t.in_place and is_stored(p) and t.element("kf.P", upper(low, high)).node is p.node):
+                    t.store("kf.P", upper(low, high), t.name(p, entry_next("p", names, low, high)))
+        if signs is not None:
+            met = t.wrapped(t.pool.some(signs.node))
+            t.later(lambda: self._settle_if(t, met))
+
+    def _settle_if(self, t: Trace, met: Value) -> None:
+        with t.when(met, rare=True):
+            self.settle(t)
 
     def from_factors(self, t: Trace, U: Rows, D: Vector) -> Symmetric:
         return assembled(U, D)

@@ -9,8 +9,9 @@ from kfgen.filters.algebra.linalg import Vector, dot, minus, plus, times
 from kfgen.filters.algebra.measurement import Measurement
 from kfgen.filters.algebra.numbers import Number, is_constant, is_one, is_positive, is_zero, reciprocal, select
 from kfgen.filters.algebra.triangles import upper_start
+from kfgen.filters.covariance.full.rounding import UNITS, inverse_of, lifting, not_negative, single_state, spoilt_by
 from kfgen.filters.covariance.full.terms import PENDING, ArrayEntries, Term
-from kfgen.filters.covariance.kernels.function import Kernels, integer
+from kfgen.filters.covariance.kernels.function import Kernels, Passed, integer
 from kfgen.filters.covariance.kernels.rows import add_terms, put_row, take_row
 from kfgen.filters.covariance.loops.motion import ArrayGain, Displacement, array_of_gain, changed_gain
 from kfgen.filters.covariance.parts import GainChange, Scalar
@@ -45,13 +46,14 @@ class Updates:
         """P - g K s K^T, put off: one more term."""
         if len(P.terms) == PENDING:
             P = P.written()
-        space, h, r, g = P.space, measurement.h, measurement.r, measurement.g
+        space, h, r, g, direct = P.space, measurement.h, measurement.r, measurement.g, _is_direct(P, measurement)
         number = len(P.terms)
         c = array_of_gain(space, f"c{number}", P.n, motion, self.steps)
         seen = [i for i, x in enumerate(h) if not is_zero(x)]
         self._times(P, h, seen, c)
-        s = t.value(plus(times(g, dot([h[i] for i in seen], [c[i] for i in seen])), r))
-        inverse = t.name(1 / s if is_positive(r) else reciprocal(s)[1], "inverse_s")
+        s, spoilt = self._spread(t, measurement, c, direct)
+        plain, inverse = inverse_of(s, r, self.epsilon)
+        t.name(inverse, "inverse_s")
         weight = t.name(t.value(times(g, inverse)), "weight")
         state: int | None = None
         share: Value | None = None
@@ -59,7 +61,18 @@ class Updates:
             state = seen[0]
             share = t.name(t.value(times(r if is_one(h[state]) else r / h[state], inverse)), "share")
         P = replace(P, terms=(*P.terms, Term(c, weight, state, share)))
-        return P, ArrayGain(t, c, nu, s, sound=False, factor=inverse)
+        return P, ArrayGain(t, c, nu, s, not direct, inverse, plain, spoilt)
+
+    def _spread(self, t: Trace, measurement: Measurement, c: Array, direct: bool) -> tuple[Value, Value | None]:
+        """s, and the condition under which rounding has spoilt it. direct: it is a variance of the struct."""
+        h, r = measurement.h, measurement.r
+        seen = [i for i, x in enumerate(h) if not is_zero(x)]
+        spread = dot([h[i] for i in seen], [c[i] for i in seen])
+        bounded = not direct and not is_positive(r)
+        s = t.value(plus(times(measurement.g, not_negative(spread) if bounded and seen else spread), r))
+        if direct or bounded:
+            return s, None
+        return s, spoilt_by(s, r) if single_state(h) < 0 else t.value(spread) < 0
 
     def _times(self, P: ArrayEntries, h: Vector, seen: list[int], c: Array) -> None:
         """c = P h^T."""
@@ -106,15 +119,17 @@ class Updates:
         self, t: Trace, P: ArrayEntries, measurement: Measurement, motion: Displacement, nu: Value
     ) -> tuple[ArrayEntries, ArrayGain]:
         """A = P - g K h P, then A - g (A h^T - r K) K^T, for any gain, in a copy of P."""
+        direct = _is_direct(P, measurement)
         P = P.written()
         n, space = P.n, P.space
-        h, r, g = measurement.h, measurement.r, measurement.g
+        h, g = measurement.h, measurement.g
         seen = [i for i, x in enumerate(h) if not is_zero(x)]
         c, rest = space.array("c0", n), space.array("rest", n)
         gain = array_of_gain(space, "gain", n, motion, self.steps)
         self._times(P, h, seen, c)
-        s = t.value(plus(times(g, dot([h[i] for i in seen], [c[i] for i in seen])), r))
+        s, spoilt = self._spread(t, measurement, c, direct)
         t.name(s, "s")
+        r = measurement.r
         inverse = t.name(1 / s if is_positive(r) else reciprocal(s)[1], "inverse_s")
         with t.loop("i", 0, n) as i:
             gain[i] = c[i] * inverse
@@ -136,12 +151,15 @@ class Updates:
                 before = times(r, gain[i]) if number == 0 else rest[i]
                 rest[i] = t.value(minus(before, times(factor, partial)))
         if not seen:
-            return P, ArrayGain(t, gain, nu, s, sound=False)
-        t.call(add_terms(self.kernels, n), [(P.array, 0), (c.name, 0), (weighted.name, 0), (rest.name, 0)])
+            return P, ArrayGain(t, gain, nu, s, sound=True)
+        but = single_state(h) if single_state(h) >= 0 else n
+        terms: list[Passed] = [(P.array, 0), (c.name, 0), (weighted.name, 0), (rest.name, 0)]
+        terms += [t.value(lifting(s, r)), integer(t, but)]
+        t.call(add_terms(self.kernels, n, UNITS * self.epsilon), terms)
         exact = len(seen) == 1 and is_constant(h[seen[0]]) and is_zero(r) and is_one(g) and self.change is None
         if exact:  # known exactly, not up to rounding
             t.call(put_row(self.kernels, n), [(P.array, 0), integer(t, seen[0]), (rest.name, 0), t.zero])
-        return P, ArrayGain(t, gain, nu, s, sound=False)
+        return P, ArrayGain(t, gain, nu, s, not direct, spoilt=spoilt)
 
     def _not_negative(self, P: ArrayEntries, measurement: Measurement, gain: ArrayGain) -> ArrayEntries:
         """A variance that an exact measurement took to zero may come out below it by round-off: back to zero."""
@@ -158,3 +176,8 @@ class Updates:
             t.flag(low, "REGULARIZED")
             array[place] = select(low, 0, variance)
         return P
+
+
+def _is_direct(P: ArrayEntries, measurement: Measurement) -> bool:
+    """Whether a row measures a variance of the struct: only who has written it there can have made it negative."""
+    return single_state(measurement.h) >= 0 and not P.terms and not P.array

@@ -27,14 +27,14 @@ class Kernels:
         self.made: dict[str, Function] = {}
 
     def function(
-        self, name: str, arguments: list[Argument], doc: str, body: Callable[[Trace], None]
+        self, name: str, arguments: list[Argument], doc: str, body: Callable[[Trace], None], returns: str = "void"
     ) -> Function:
-        """The function of a name; body traces it."""
+        """The function of a name; body traces it. returns: `status` where it raises flags."""
         if name not in self.made:
             t = Trace(self.smallest)
             body(t)
             names = self.taken | {a.name for a in arguments} | {"x", "kf"}
-            self.made[name] = Function(name, arguments, schedule(t, names), doc, returns="void", private=True)
+            self.made[name] = Function(name, arguments, schedule(t, names), doc, returns, private=True)
         return self.made[name]
 
 

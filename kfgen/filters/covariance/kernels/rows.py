@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from kfgen.filters.algebra.triangles import upper_start
 from kfgen.filters.covariance.kernels.function import (
     Given,
@@ -46,16 +48,23 @@ def put_row(kernels: Kernels, n: int) -> Function:
     return kernels.function("put_row", arguments, "Replace row and column i of a symmetric matrix by factor row", body)
 
 
-def add_terms(kernels: Kernels, n: int) -> Function:
-    """Joseph's form in the end: P - gain c^T + rest gain^T, the upper triangle."""
+def add_terms(kernels: Kernels, n: int, units: Fraction) -> Function:
+    """Joseph's form in the end: P - gain c^T + rest gain^T, the upper triangle. In the variances of states that are not
+    themselves measured (one, `but`, may be) units of s come to r: see `full.rounding`."""
 
     def body(t: Trace) -> None:
         P, c, gain, rest = (Given(t, name) for name in ("P", "c", "gain", "rest"))
+        but, lift = counter(t, "but"), t.name(t.field("s") * units, "lift")
         with t.loop("j", 0, n) as j:
             c_j, gain_j = t.name(c[j], "c_j"), t.name(gain[j], "gain_j")
-            with t.loop("i", 0, j + 1) as i:
+            with t.loop("i", 0, j) as i:
                 P[upper_start(j) + i] = P[upper_start(j) + i] - gain[i] * c_j + rest[i] * gain_j
+            more = t.name(t.select((j < but) | (but < j), lift, 0), "more")
+            place = upper_start(j) + j
+            P[place] = P[place] - gain_j * c_j + (rest[j] + gain_j * more) * gain_j
 
     arguments = [array_argument("P", n * (n + 1) // 2)]
     arguments += [array_argument(name, n, constant=True) for name in ("c", "gain", "rest")]
-    return kernels.function("joseph", arguments, "P <- P - gain c^T + rest gain^T", body)
+    arguments += [number_argument("s"), counter_argument("but")]
+    doc = "P <- P - gain c^T + rest gain^T, and of variances but one what rounding takes"
+    return kernels.function("joseph", arguments, doc, body)

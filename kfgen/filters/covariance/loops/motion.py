@@ -112,6 +112,8 @@ class ArrayGain:
     s: Value
     sound: bool
     factor: Value | None = None
+    inverse: Value | None = None  # 1 / s, as it stands in factor
+    spoilt: Value | None = None
 
     def at(self, i: int | Value) -> Number:
         return times(self.array[i], 1 if self.factor is None else self.factor)
@@ -119,7 +121,7 @@ class ArrayGain:
     def applied(self, motion: Displacement) -> tuple[Displacement, Number]:
         step = self.t.name(self.nu if self.factor is None else self.factor * self.nu, "step")
         motion = motion.with_terms(motion.array, (*motion.terms, (self.array, step)))
-        return motion, self.nu * (self.nu * (1 / self.s))
+        return motion, self.nu * (self.nu * (1 / self.s if self.inverse is None else self.inverse))
 
 
 @dataclass(frozen=True)
@@ -130,6 +132,7 @@ class AppliedGain:
     s: Value
     square: Value
     sound: bool
+    spoilt: Value | None = None
 
     def applied(self, motion: Displacement) -> tuple[Displacement, Number]:
         return motion.with_terms(self.moved, ()), self.square
