@@ -129,7 +129,7 @@ class Interface:
         variance = self._variance(error)
         # P_ii has the LSB 2^(2 e + n) outside, and has to fit there too
         # where gains depend on the data, so do variances; those of a bank grow with what its modes differ by
-        room = 1 + (self.f.more if self.f.spare or self.code.modes else 0)
+        room = 1 + (self.f.more if self.code.modes else self.f.spare)
         least = math.ceil((above(variance) + room - OUTSIDE - self.f.bits) / 2) if variance else None
         if self.model.periods[i] is not None:  # wrapped before it is stored
             self.f.ranges.see(cell, float(self.model.periods[i] or 0) / 2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TypeVar
 
-from kfgen.fixed.arithmetic.limits import FINE
+from kfgen.fixed.arithmetic.limits import FINE, INSIDE
 from kfgen.fixed.lowering.carry import Carry
 from kfgen.fixed.lowering.deferred import Deferred
 from kfgen.fixed.lowering.expressions import Expressions
@@ -98,7 +98,8 @@ class Statements:
                 if value.kind != "real":
                     return [replace(s, value=self.x.index(value))]
                 e = self.exponent(("variable", self.f.name, name))
-                return [replace(s, value=self.x.value(value, e).node, point=e)]
+                made = replace(s, value=self.x.value(value, e).node, point=e)
+                return [made, *self.clipped(value, make("read", (), name))]
             case Assign():
                 return [self.store(s)]
             case Store() if s.name == "kf.mu" and self.c.formats.bits < FINE:
@@ -155,7 +156,15 @@ class Statements:
             self.c.locals[name] = raw
             return []
         self.c.locals[name] = replace(raw, node=make("variable", (), name))
-        return [Let(raw.node, name, raw.e)]
+        return [Let(raw.node, name, raw.e), *self.clipped(node, make("variable", (), name))]
+
+    def clipped(self, node: Node, value: Node) -> list[Statement]:
+        """What is said of an adapted noise that its format has clipped, however long ago."""
+        if node.op != "element" or not self.f.name.startswith(("get_R", "get_Q")):
+            return []
+        end = INSIDE - 1
+        ends = ((constant(end), value), (value, constant(-end)))
+        return [Flag(make("lt", pair, None, "bool"), "SATURATED") for pair in ends]
 
     def outside(self, name: str) -> bool:
         """Whether a local is stored where the user sees it, with all 31 bits."""
