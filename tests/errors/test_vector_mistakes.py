@@ -127,6 +127,8 @@ MISTAKES = [
      "`q` is a quaternion, not a 3-vector"),
     ("states: {p: p}", "states: {q_w: 1}", "q_w", "initialize[1].states.q_w", "name it whole, `q`"),
     ("var: {p: 25}", "var: {q_w: 25}", "q_w", "initialize[1].var.q_w", "or q_rx, q_ry, q_rz"),
+    ("states: {p: p}", "states: {pp: p}", "pp", "initialize[1].states.pp", "there is no state `pp`; did you mean `p`?"),
+    ("outputs:\n", "outputs:\n  o: {value: v}\n  o_x: {value: 1}\n", "o_x", "outputs.o_x", "`o_x` is there twice"),
     # sensor inputs and outputs
     ("norm(v)", "norm(gyro)", "gyro", "outputs.speed.value", "the input `gyro` may not stand in"),
     ("norm(v)", "norm(sat)", "sat", "outputs.speed.value", "`sat` is an input of the sensor `pr`"),
