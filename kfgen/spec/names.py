@@ -107,6 +107,10 @@ def _scaled(spec: Spec, upper: str) -> Iterator[tuple[str, str, Place]]:
         for c in s.fields
     ]
     values += [(o.name, f"the output `{o.name}`", o.place) for o in spec.outputs]
+    values += [(e, f"the error coordinate `{e}`", r.place) for r in spec.rotations for e in r.errors]
+    for s in spec.measurements:
+        of = f"the residual of `{s.name}`"
+        values += [(f"{s.name}_{e}", f"{of}, `{e}`", r.place) for r in s.rotations for e in r.errors]
     if spec.dt is not None and spec.dt.run_time:
         values.append(("dt", "dt", spec.place))
     for name, what, place in values:

@@ -21,6 +21,65 @@ def test_every_key_is_covered() -> None:
     assert not missing - {"kfgen"}
 
 
+def test_vectors_are_their_parts() -> None:
+    spec = load(FOLDER / "inertial.yaml")
+    assert [state.name for state in spec.states[:8]] == ["p_n", "p_e", "p_d", "v_x", "v_y", "v_z", "q_w", "q_x"]
+    assert spec.errors[6:] == ("q_rx", "q_ry", "q_rz", "bg_x", "bg_y", "bg_z")
+    assert {group.name: group.parts for group in spec.groups}["g"] == ("g_x", "g_y", "g_z")
+    (q,) = spec.rotations
+    assert (q.name, q.error, q.reset) == ("q", "body", True)
+    assert [value(e.tree) for e in q.variances if e is not None] == [Fraction(1, 100), Fraction(1, 100), 1]
+    assert [spec.dynamics.f[name].tree for name in ("p_n", "p_d")] == [Name("v_x"), Name("v_z")]
+    assert list(spec.dynamics.f)[6:] == ["q_rx", "q_ry", "q_rz"]
+    assert list(spec.dynamics.Q) == ["bg_x", "bg_y", "bg_z"]
+    sensors = {sensor.name: sensor for sensor in spec.measurements}
+    assert [component.name for component in sensors["gnss"].components] == ["p_n", "p_e", "p_d"]
+    assert sensors["star"].errors == ("q_rx", "q_ry", "q_rz")
+    assert sensors["star"].rotations[0].error == "reference"
+    assert [given.name for given in sensors["pr"].inputs] == ["sat_x", "sat_y", "sat_z", "sigma"]
+    assert [output.name for output in spec.outputs] == ["yaw_deg", "speed"]
+    ahrs, gnss = spec.initialize
+    assert list(ahrs.states) == ["q_w", "q_x", "q_y", "q_z"]
+    assert {name: e.tree for name, e in gnss.states.items()} == {f"p_{part}": Name(f"p_{part}") for part in "ned"}
+    assert {name: value(e.tree) for name, e in gnss.variance.items()} == {f"p_{part}": 25 for part in "ned"}
+
+
+BANK = """
+kfgen: 1
+name: b
+dt: 0.1
+states: {q: {kind: quaternion, init: [1, 0, 0, 0], std: 0.1, reset: false}, b: {vector: 3, init: 0, std: 0.1}}
+inputs: {g: {vector: 3}}
+measurements: {m: {z: {a: {h: "unrotate(q, [0, 0, 1])", std: 0.1}}}}
+imm:
+  modes:
+    a: {dynamics: {f: {q: "q*from_rotation_vector(dt*(g - b))"}, Q: {q: 1e-5}}}
+    c:
+      states: {q: {init: [0, 0, 0, 3], std: [1, 2, 3]}, b: {init: 1, std: [1, 2, 3]}}
+      noise: {w: {vector: 3, std: 0.1}}
+      dynamics: {f: {q: "q*from_rotation_vector(dt*(g - b + w))"}}
+      filter: {type: ukf}
+    d: {P0: "diag([1, 1, 1, 2, 2, 2])", dynamics: {f: {}, Q: {q: 1e-4}}, filter: {type: iekf, variance_floor: 1e-9}}
+  transition: "(diag([17, 17, 17]) + [[1, 1, 1], [1, 1, 1], [1, 1, 1]])/20"
+"""
+
+
+def test_modes_have_vectors_of_their_own() -> None:
+    spec = loads(BANK)
+    assert spec.imm is not None
+    a, c, d = spec.imm.modes
+    assert [value(e.tree) for r in c.rotations for e in r.variances if e is not None] == [1, 4, 9]
+    assert [value(state.init.tree) for state in c.states] == [0, 0, 0, 1, 1, 1, 1]
+    assert a.rotations == spec.rotations
+    assert d.rotations[0].variances == (None, None, None)
+    assert d.P0 is not None
+    assert len(d.P0) == len(d.P0[0]) == 6
+    assert list(d.filter.variance_floor) == list(spec.errors)
+    with pytest.raises(SpecError, match="the state `q` is missing") as caught:
+        loads(BANK.replace("q: {init: [0, 0, 0, 3], std: [1, 2, 3]}, b", "b"))
+    assert len(caught.value.mistakes) == 1
+
+
 def test_vehicle() -> None:
     spec = load(FOLDER / "vehicle.yaml")
     assert [s.name for s in spec.states] == ["px", "py", "v", "th", "course", "b"]

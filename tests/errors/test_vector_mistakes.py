@@ -81,6 +81,7 @@ MISTAKES = [
     (Q, "", "q:", "states.q", "one of `std`, `var` is missing"),
     (Q, ", std: 1, var: 1", "var", "states.q.var", "`std` and `var` are given both"),
     (Q, ", std: 1, bounds: [-1, 1]", "bounds", "states.q.bounds", "`bounds` does not go with a quaternion"),
+    (Q, ", std: 1, unit: deg", "deg", "states.q.unit", "of a quaternion is in rad, not in 'deg'; convert"),
     (Q, ", std: 1, vector: 4", "vector", "states.q.vector", "a quaternion has its own parts"),
     ("std: 0.5, unit: m/s}", "std: 0.5, error: body}", "error", "states.v.error",
      "is not used by a state of kind `real`"),
@@ -103,6 +104,9 @@ MISTAKES = [
      "name it whole, `q`"),
     ("outputs:", "filter: {variance_floor: {p: [1, 2]}}\noutputs:", "[1, 2]", "filter.variance_floor.p",
      "a 3-vector, not a 2-"),
+    ("outputs:", "filter: {gain_limit: '[1, 2]', update: joseph}\noutputs:", "'[1", "filter.gain_limit",
+     "a number is wanted here, not a 2-vector; write one number"),
+    ("dt: 0.01", "dt: g", "g", "dt", "a number is wanted here, not a 3-vector"),
     # measured quaternions
     (STAR, "z: {q: {h: q}}, R: 'diag([1, 1, 1, 1])'", "R", "measurements.star.R",
      "there are 3 coordinates of the residual"),
@@ -113,6 +117,8 @@ MISTAKES = [
     (H, "h: yaw(q), error: body", "error", "measurements.heading.z.yaw.error", "is no quaternion, and has no `error`"),
     (MAG + " std: 0.5}}}", MAG + ' std: 0.5, residual: "cross(z, h)"}}}',
      '"cross', "measurements.mag.z.b.residual", "uses other parts of z or h than its own"),
+    ("std: [1, 1, 2], unit: m}}}", "var: [[1, 2, 0], [2, 1, 0], [0, 0, 2]]}}}", "1", "measurements.gnss.z.p.var[0][0]",
+     "is not positive semidefinite"),
     # initialize
     ("triad(acc,", "triad(accc,", "accc", "initialize[0].states.q", "no component of ahrs `accc`; did you mean `acc`?"),
     ("1], field)", "1], v)", "v)", "initialize[0].states.q", "the state `v` may not stand in"),
@@ -121,6 +127,8 @@ MISTAKES = [
      "`q` is a quaternion, not a 3-vector"),
     ("states: {p: p}", "states: {q_w: 1}", "q_w", "initialize[1].states.q_w", "name it whole, `q`"),
     ("var: {p: 25}", "var: {q_w: 25}", "q_w", "initialize[1].var.q_w", "or q_rx, q_ry, q_rz"),
+    ("states: {p: p}", "states: {pp: p}", "pp", "initialize[1].states.pp", "there is no state `pp`; did you mean `p`?"),
+    ("outputs:\n", "outputs:\n  o: {value: v}\n  o_x: {value: 1}\n", "o_x", "outputs.o_x", "`o_x` is there twice"),
     # sensor inputs and outputs
     ("norm(v)", "norm(gyro)", "gyro", "outputs.speed.value", "the input `gyro` may not stand in"),
     ("norm(v)", "norm(sat)", "sat", "outputs.speed.value", "`sat` is an input of the sensor `pr`"),

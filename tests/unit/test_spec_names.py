@@ -92,6 +92,15 @@ def test_the_reference_names_every_key() -> None:
     assert all(f"`{name}(" in page for name in VECTOR_FUNCTIONS)
 
 
+def test_the_emitted_names_of_a_rotation() -> None:
+    text = EXAMPLE.replace("name: ins", "name: ins\nscalar: q16.16") + "\ncode: {flash: 900k}"
+    found = {name for name, _, _ in identifiers(loads(text.replace("[22, 0, -42]", "[0.5, 0, -0.8]")))}
+    assert found >= {"INS_NX", "INS_NE", "INS_Q_W", "INS_ERROR_Q_RX", "INS_ERROR_P_N", "INS_Q_RX_LSB", "INS_Q_W_LSB",
+                     "INS_RANGE_ANCHOR_X_LSB", "INS_YAW_DEG_LSB", "ins_outputs_t", "ins_get_outputs"}  # fmt: skip
+    with pytest.raises(SpecError, match="INS_ERROR_Q_RX"):
+        loads(EXAMPLE.replace("  bg: {vector: 3,", "  error_q_rx: {init: 0, std: 1}\n  bg: {vector: 3,"))
+
+
 def test_the_example_of_the_reference_builds() -> None:
     spec = loads(EXAMPLE)
     assert spec.errors[6:9] == ("q_rx", "q_ry", "q_rz")

@@ -12,8 +12,18 @@ Limits = Mapping[tuple[str, int | None], Span]
 """Path of a field, with the index of an element -> its declared limits."""
 
 
-def span(node: Node, limits: Limits) -> Span | None:
-    """The limits of a sum of products; None where something is not declared, or is another operation."""
+def span(node: Node, limits: Limits, known: dict[Node, Span | None] | None = None) -> Span | None:
+    """The limits of a sum of products; None where something is not declared, or is another operation.
+
+    known: those of nodes that were met before: a node stands in many others.
+    """
+    known = {} if known is None else known
+    if node not in known:
+        known[node] = _span(node, limits, known)
+    return known[node]
+
+
+def _span(node: Node, limits: Limits, met: dict[Node, Span | None]) -> Span | None:
     if node.constant is not None:
         return node.constant, node.constant
     if node.op == "field":
@@ -21,7 +31,7 @@ def span(node: Node, limits: Limits) -> Span | None:
     if node.op == "element":
         index = node.args[0].constant
         return None if index is None else limits.get((str(node.data), int(index)))
-    inner = [span(a, limits) for a in node.args]
+    inner = [span(a, limits, met) for a in node.args]
     known = [s for s in inner if s is not None]
     if len(known) < len(inner) or not known:
         return None

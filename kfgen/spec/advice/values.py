@@ -16,7 +16,7 @@ from kfgen.spec.operations import NoValue, less
 from kfgen.spec.problems import short
 from kfgen.spec.raw import key_of
 from kfgen.spec.tree import Call, Expression, Name, Number, Tree, names
-from kfgen.spec.types import Range, Spec
+from kfgen.spec.types import Range, Rotation, Spec
 
 _DEGREES = re.compile(r"\s*(?:deg|degs|degree|degrees|dps|\N{DEGREE SIGN})\s*(?:/.*)?\Z", re.IGNORECASE)
 _VARIANCE = re.compile(r"(?:var|variance)(?:_?\w*)?\Z|\w*(?:_sq|_squared|_var|_variance)\Z|(?:sigma|std)\w*?_?2\Z")
@@ -32,6 +32,7 @@ def advice(spec: Spec) -> Iterator[Advice]:
     for mode in mode_specs(spec):
         yield from _alpha(mode)
         yield from _angles(mode, known)
+        yield from _rotations((*mode.rotations, *(r for s in mode.measurements for r in s.rotations)), known)
         yield from _trigonometry(mode, known)
     yield from _deviations(spec)
 
@@ -108,6 +109,15 @@ def _angles(mode: Spec, known: dict[str, float]) -> Iterator[Advice]:
             if variance > math.pi**2:
                 text = f"the standard deviation {math.sqrt(variance):g} rad is more than half a turn: degrees?"
                 yield Advice(component.variance.place, text, cure, "degrees")
+
+
+def _rotations(rotations: tuple[Rotation, ...], known: dict[str, float]) -> Iterator[Advice]:
+    for rotation in rotations:
+        for variance in rotation.variances:
+            number = _number(variance, known)
+            if variance is not None and number is not None and number > 4 * math.pi**2:
+                text = f"the rotation error {math.sqrt(number):g} rad is more than a turn: degrees?"
+                yield Advice(variance.place, text, "write it in rad (`*pi/180`)", "degrees")
 
 
 def _trigonometry(mode: Spec, known: dict[str, float]) -> Iterator[Advice]:

@@ -97,6 +97,7 @@ class ModesBuilder:
                 return tuple(replace(state, variance=None) for state in spec.states)
             return spec.states
         own = dict(entries(f.get("states")))
+        whole = {part: group.name for group in spec.groups for part in group.parts}
         found = []
         for state in spec.states:
             fields = own.get(state.name)
@@ -105,7 +106,7 @@ class ModesBuilder:
                 if isinstance(written, Fields) and state.name not in written:
                     self.problems.add(
                         written.place,
-                        f"the state {short(state.name)} is missing",
+                        f"the state {short(whole.get(state.name, state.name))} is missing",
                         SHARED_STATES,
                     )
                 found.append(replace(state, variance=self.values.bad(state.place)))

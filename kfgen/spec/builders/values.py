@@ -46,6 +46,7 @@ class Values:
         if isinstance(written, Fields):
             return "periodic", self.formula(written, "periodic")
         if written == "quaternion":
+            self._unit_of_rotation(f)
             return "quaternion", None
         if written != "angle":
             return "real", None
@@ -58,6 +59,13 @@ class Values:
                 "convert it, or write `kind: {periodic: 360}`",
             )
         return "angle", Expression(Call("mul", (Number(Fraction(2)), Name("pi"))), "2*pi", f.at("kind"))
+
+    def _unit_of_rotation(self, f: Fields) -> None:
+        unit = f.get("unit")
+        if unit not in (None, "", "1", "-", "rad"):
+            at = self.walker.value_place(path_text((*f.path, "unit")), f.place)
+            text = f"the rotation error of a quaternion is in rad, not in {unit!r}"
+            self.problems.add(at, text, "convert std or var, and leave `unit` out")
 
     def variance(self, f: Fields, covered: bool, needed: bool = True, more: tuple[str, ...] = ()) -> Expression | None:
         """std squared, or var (or one of `more`): exactly one of them, or none where a matrix covers it."""

@@ -129,7 +129,7 @@ def _matrix(facts: Facts, matrix: Matrix, names: list[str], of: str, path: str, 
     """A full covariance: square, of the right size, symmetric, positive semidefinite where it is constant."""
     size = len(names)
     key = path.rpartition(".")[2]
-    place = facts.at(path)
+    place = facts.at(path, otherwise=matrix[0][0].place if matrix and matrix[0] else None)
     if not names:
         return
     for i, row in enumerate(matrix):

@@ -18,10 +18,12 @@ _TYPES = {
 
 
 def check(facts: Facts) -> None:
-    for model in facts.models():
+    models = list(facts.models())
+    for model in models:
         for rotation in model.rotations:
             _type(facts, model, rotation, f"the quaternion {short(rotation.name)}")
-            _reset(facts, model, rotation)
+            if all(each.filter.type == "iekf" for each in models):
+                _reset(facts, rotation)
             _init(facts, model, rotation)
         for sensor in model.measurements:
             for rotation in () if model.rotations else sensor.rotations:
@@ -36,9 +38,9 @@ def _type(facts: Facts, model: Model, rotation: Rotation, what: str) -> None:
         facts.add(at, text, "choose `type: ekf`, `iekf` or `ukf`")
 
 
-def _reset(facts: Facts, model: Model, rotation: Rotation) -> None:
+def _reset(facts: Facts, rotation: Rotation) -> None:
     path = f"states.{rotation.name}.reset"
-    if model.filter.type == "iekf" and facts.written(path):
+    if facts.written(path):
         text = "`reset` does not go with an iekf: its last linearisation is at the new attitude already"
         facts.add(facts.at(path), text, "remove `reset`")
 

@@ -75,7 +75,7 @@ class FormulaReader:
 
     def number(self, raw: Expression, local: Local | None = None, own: list[Definition] | None = None) -> Expression:
         """A formula where one number is wanted."""
-        return self.parts(raw, NUMBER, "a number is wanted here", "", local, own)[0]
+        return self.parts(raw, NUMBER, "a number is wanted here", "write one number, or one part of it", local, own)[0]
 
     def parts(
         self, raw: Any, extent: Extent, what: str, hint: str, local: Local | None = None,

@@ -75,7 +75,8 @@ class TargetReader:
             place = written.at(name)
             targets = self.targets(name, place, errors, whole)
             if targets is None:
-                found.values[name], found.places[name] = self.reader.plain(raw, local), place
+                value = None if raw is None else self.reader.value(raw, local, own).parts[0]
+                found.values[name], found.places[name] = value, place
                 continue
             values = self.values(name, raw, targets, errors, key, blocks, local, own)
             for target, value in zip(targets, values, strict=True):
