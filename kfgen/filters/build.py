@@ -231,8 +231,8 @@ def _order(models: tuple[Model, ...]) -> list[int]:
     if models[0].rotations:
         blocks = [range(r.first_error, r.first_error + 3) for r in models[0].rotations]
         found = upper_order(F, blocks)
-        if found is not None:
-            return found
+        if found is not None:  # of a full covariance what others use is stored first
+            return found[::-1] if models[0].spec.filter.covariance == "full" else found
     return best_order(F, noisy, measured)
 
 

@@ -67,9 +67,9 @@ def upper_order(F: list[set[int]], blocks: list[range]) -> list[int] | None:
         if not ready:
             return None
         alone = [u for u in ready if F[u] == {u} and not any(u in row for i, row in enumerate(F) if i != u)]
-        chosen = min(alone or ready)
-        placed.add(chosen)
-        order += [i for i in range(n) if unit[i] == chosen]
+        for chosen in sorted(alone or ready):
+            placed.add(chosen)
+            order += [i for i in range(n) if unit[i] == chosen]
     return order
 
 

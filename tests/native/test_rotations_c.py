@@ -12,7 +12,7 @@ from kfgen.spec.types import Adaptive, Code, Filter, Gate, Robust
 from tests.oracle import inertial
 from tests.oracle.attitude import ERRORS, expression, star, turning
 from tests.oracle.error_state import compose, exp
-from tests.oracle.formulas import quaternion
+from tests.oracle.formulas import formula, quaternion
 from tests.oracle.test_rotation_options import bank
 
 Q = quaternion("q")
@@ -43,47 +43,53 @@ def inertial_calls(rows, sensors=("gnss", "mag")):
                 yield "update", name, z[name]
 
 
-@BOTH
-@pytest.mark.parametrize("reset", [True, False])
-def test_ekf(error, reset):
-    along(inertial.spec(error, reset), inertial_calls(400))
+INERTIAL = [
+    ("body", True, Filter("ekf", "ud", "bierman"), ("gnss", "mag"), 400),
+    ("reference", False, Filter("ekf", "full", "standard"), ("gnss", "mag"), 400),
+    ("reference", True, Filter("ekf", "sqrt", None), ("gnss", "mag", "star"), 100),
+    ("body", True, Filter("iekf", "full", "joseph", iterations=3), ("gnss", "mag", "star"), 60),
+    ("body", True, inertial.ukf("ud"), ("gnss", "mag", "star"), 30),
+    ("reference", True, inertial.ukf("full", redraw=False), ("mag",), 30),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(("covariance", "update"), ALL_FORMS)
-@pytest.mark.parametrize("unroll", ["auto", "none"])
-def test_forms(covariance, update, unroll):
-    chosen = Filter("ekf", covariance, update)
-    spec = inertial.spec(chosen=chosen, star="body", code=Code(unroll=unroll))
-    along(spec, inertial_calls(60, ("gnss", "mag", "star")))
-
-
-@pytest.mark.parametrize("unroll", ["auto", "none"])
-@pytest.mark.parametrize(("covariance", "update"), ALL_FORMS[::2])
-def test_iekf(covariance, update, unroll):
-    chosen = Filter("iekf", covariance, update, iterations=3)
-    spec = inertial.spec("reference", chosen=chosen, star="reference", code=Code(unroll=unroll))
-    along(spec, inertial_calls(60, ("gnss", "mag", "star")))
-
-
-@BOTH
-@pytest.mark.parametrize("covariance", ["ud", "full", "sqrt"])
-@pytest.mark.parametrize("redraw", [True, False])
-def test_ukf(error, covariance, redraw):
-    sensors = ("gnss",) if not redraw else ("gnss", "mag", "star")
-    spec = inertial.spec(error, chosen=inertial.ukf(covariance, redraw), star=error)
+@pytest.mark.parametrize(("error", "reset", "chosen", "sensors", "rows"), [
+    INERTIAL[0], *(pytest.param(*each, marks=pytest.mark.long) for each in INERTIAL[1:]),
+])  # fmt: skip
+def test_inertial(error, reset, chosen, sensors, rows):
+    """15 errors, 6 noises, tumbling at 3 rad/s."""
+    spec = inertial.spec(error, reset, chosen, star=error)
     spec = replace(spec, measurements=tuple(s for s in spec.measurements if s.name in sensors))
-    along(spec, inertial_calls(30, sensors), 1e-7)
+    along(spec, inertial_calls(rows, sensors), 1e-7 if chosen.type == "ukf" else 1e-9)
 
 
-@pytest.mark.parametrize("options", [
-    {"covariance": "ud", "sequential": True}, {"augment": True}, {"adaptive": Adaptive(expression(0.5))},
-    {"adapt_R": expression(0.01)}, {"reject": "non_finite"}, {"variance_floor": {"q_rx": expression(1e-4)}},
-], ids=lambda o: "+".join(o))  # fmt: skip
-@pytest.mark.parametrize("unroll", ["auto", "none"])
-def test_ukf_options(options, unroll):
-    chosen = inertial.ukf(**{"covariance": "full", **options})
-    spec = inertial.spec(chosen=chosen, star="body", code=Code(unroll=unroll))
-    along(spec, inertial_calls(16, ("gnss", "mag", "star")), 1e-7)
+@pytest.mark.long
+@pytest.mark.parametrize("covariance", ["ud", "full", "sqrt"])
+def test_inertial_in_loops(covariance):
+    updates = {"ud": "bierman", "full": "standard", "sqrt": None}
+    chosen = Filter("ekf", covariance, updates[covariance])
+    along(inertial.spec(chosen=chosen, code=Code(unroll="none")), inertial_calls(60))
+
+
+KINDS = [
+    *(Filter("ekf", covariance, update) for covariance, update in ALL_FORMS),
+    *(Filter("iekf", covariance, update, iterations=3) for covariance, update in ALL_FORMS[::2]),
+    *(inertial.ukf(covariance, redraw) for covariance in ("ud", "full", "sqrt") for redraw in (True, False)),
+    inertial.ukf("ud", sequential=True), inertial.ukf("full", augment=True),
+    inertial.ukf("full", adaptive=Adaptive(expression(0.5))), inertial.ukf("ud", adapt_R=expression(0.01)),
+    inertial.ukf("sqrt", reject="non_finite"), inertial.ukf("full", variance_floor={"q_rx": expression(0.01)}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("chosen", KINDS, ids=range(len(KINDS)))
+@pytest.mark.parametrize(("error", "unroll"), [("body", "auto"), ("reference", "none")])
+def test_kinds_and_forms(chosen, error, unroll):
+    """An attitude with a bias of one axis."""
+    rates = dict(zip(ERRORS, [formula(name) for name in GYRO], strict=True))
+    rates |= {"q_rx": formula("gyro_x") - formula("b") - formula("w")}
+    spec = tracker(error, chosen, seen="reference", f=rates, beside={"b": (0.0, 0.1)}, noise={"w": 1e-4},
+                   code=Code(unroll=unroll))  # fmt: skip
+    along(spec, tracker_calls(16), 1e-7 if chosen.type == "ukf" else 1e-9)
 
 
 def tracker(error="body", chosen=None, seen="body", **changes):

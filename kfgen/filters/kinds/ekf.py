@@ -21,6 +21,7 @@ from kfgen.filters.frame import guards
 from kfgen.filters.kinds.single import SingleFilter
 from kfgen.filters.kinds.work import Learnt, Update
 from kfgen.filters.steps import process
+from kfgen.filters.steps.aligned import aligned
 from kfgen.filters.steps.phases import Judged, Made, Phases
 from kfgen.filters.steps.process import Advance, Prior, Step
 from kfgen.filters.steps.resetting import moving
@@ -126,7 +127,9 @@ class Ekf(SingleFilter):
 
     def linearise(self, u: Update) -> Linearised:
         """h, H, R of the sensor at the prior."""
-        return u.code.linearise(u.x)
+        linear = u.code.linearise(u.x)
+        straight = bool(self.model.rotations) and not self.form.indexed  # loops want rows that measure something
+        return aligned(u.code, linear, u.x) if straight else linear
 
     def innovation(self, u: Update, linear: Linearised) -> Innovation:
         """Scalar measurements of a linearisation: R adapted, masked, decorrelated."""
