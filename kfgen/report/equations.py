@@ -50,6 +50,7 @@ def printed(expression: Any) -> str:
     text: str = printer.doprint(expression)
     text = text.replace("<mo><</mo>", "<mo>&lt;</mo>").replace("<mo>></mo>", "<mo>&gt;</mo>")
     text = re.sub(r"<mo>([()])</mo>", r'<mo stretchy="false">\1</mo>', text)
+    text = text.replace("<mo>-</mo>", "<mo>&#x2212;</mo>")
     for name, plain in _ENTITIES.items():
         text = text.replace(name, plain)
     return text

@@ -70,7 +70,8 @@ def plain_path(path: str) -> str:
 def written(spec: Spec) -> dict[str, Expression]:
     """Path -> the formula that stands there, of all that stand in the file."""
     found = {plain_path(each.place.path): each for each in expressions(spec) if each.place.path and each.place.line}
-    found = {path: each for path, each in found.items() if not path.endswith(".kind")}  # the period of an angle is 2 pi
+    # the period of an angle is 2 pi, and a range is for scaling only
+    found = {path: each for path, each in found.items() if not path.endswith(".kind") and ".range[" not in path}
     return {path: found[path] for path in sorted(found, key=lambda p: (found[p].place.line, found[p].place.column))}
 
 
