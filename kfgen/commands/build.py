@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kfgen.commands.options import example, load_spec, quiet_option, read_ranges, scalar_option, tell_advice
+from kfgen.commands.plain import json_option, of_build, tell
 from kfgen.commands.progress import progress
 from kfgen.commands.tables import Notes, Part, Paths, Table, show
 from kfgen.errors import KfgenError, Mistake, SpecError
@@ -63,6 +64,7 @@ class Built:
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Also write over files that were edited by hand, or are not kfgen's.")
 @quiet_option
+@json_option
 @click.option(
     "--selftest", is_flag=True,
     help="Also write <name>_selftest.c, which replays a recorded run: <name>_selftest() is 0 where the filter works.",
@@ -81,6 +83,7 @@ def build(
     layout: str,
     force: bool,
     quiet: bool,
+    as_json: bool,
 ) -> None:
     """Write the C files of one or more specs to DIR/<name>/, and print what they take.
 
@@ -96,7 +99,10 @@ def build(
     from kfgen.files import write_all
 
     write_all(changed({path: text for each in built for path, text in each.files.items()}, force))
-    show(*report(built))
+    if as_json:
+        tell(of_build(built))
+    else:
+        show(*report(built))
 
 
 def generate_all(

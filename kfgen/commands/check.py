@@ -18,6 +18,7 @@ from kfgen.commands.options import (
     spec_argument,
     tell_advice,
 )
+from kfgen.commands.plain import json_option, of_check, tell
 from kfgen.commands.tables import Part, Table, Verdict, show
 
 if TYPE_CHECKING:
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
 @scalar_option
 @ranges_option
 @quiet_option
-def check(spec: Path, scalar: str | None, ranges: Path | None, quiet: bool) -> None:
+@json_option
+def check(spec: Path, scalar: str | None, ranges: Path | None, quiet: bool, as_json: bool) -> None:
     """Compile what would be emitted and hold it against the numpy reference on a random track.
 
     Prints the largest error of x (in standard deviations) and of P (relative to sqrt(P_ii P_jj)) and the
@@ -47,7 +49,10 @@ def check(spec: Path, scalar: str | None, ranges: Path | None, quiet: bool) -> N
         tell_advice(loaded)
     log = read_ranges(ranges, loaded)
     outcome = compare(loaded, generated=None if log is None else generate(loaded, log=log))
-    show(*report(outcome))
+    if as_json:
+        tell(of_check(outcome))
+    else:
+        show(*report(outcome))
     sys.exit(0 if outcome.passed else 1)
 
 

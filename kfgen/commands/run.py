@@ -22,6 +22,7 @@ from kfgen.commands.options import (
     scalar_option,
     spec_argument,
 )
+from kfgen.commands.plain import json_option, of_run, tell
 from kfgen.commands.progress import progress
 from kfgen.commands.tables import Table, on_terminal, show
 from kfgen.scalar_names import FLOAT
@@ -49,6 +50,7 @@ LONG = 200_000
 @columns_option
 @scalar_option
 @ranges_option
+@json_option
 def run(
     spec: Path,
     log: Path,
@@ -58,6 +60,7 @@ def run(
     renamed: Path | None,
     scalar: str | None,
     ranges: Path | None,
+    as_json: bool,
 ) -> None:
     """Run the compiled filter over a log with the columns t, <input>, <sensor>.<component>, <sensor>.<its input>.
 
@@ -72,7 +75,7 @@ def run(
     made), tells of them; rows stand in the order of arrival.
 
     The result has the columns t, x.<state>, var.<state>, nis.<sensor>, status, mu.<mode>, out.<output>,
-    out_std.<output>. It goes to OUT.csv, or to stdout if neither -o nor --plot is given.
+    out_std.<output>. It goes to OUT.csv, or to stdout if none of -o, --plot and --json is given.
     """
     from kfgen import logs, native
 
@@ -91,12 +94,14 @@ def run(
         click.echo(f"kfgen: {line}", err=True)
     if out is not None:
         logs.write(out, columns(loaded, result))
-    elif plot is None:
+    elif plot is None and not as_json:
         logs.write_to(sys.stdout.buffer, columns(loaded, result))
     if plot is not None:
         from kfgen.plot import draw
 
         draw(plot, loaded, data, result)
+    if as_json:
+        tell(of_run(result))
     if result.failed:
         click.echo("kfgen: every update failed", err=True)
         sys.exit(1)
