@@ -5,12 +5,12 @@ from __future__ import annotations
 import difflib
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from kfgen.commands.built import Built
 from kfgen.commands.options import example, load_spec, quiet_option, read_ranges, scalar_option, tell_advice
 from kfgen.commands.plain import json_option, of_build, tell
 from kfgen.commands.progress import progress
@@ -23,20 +23,6 @@ from kfgen.seal import is_edited, is_same, sealed
 if TYPE_CHECKING:
     from kfgen.generate import Generated
     from kfgen.spec.types import Spec
-
-
-@dataclass(frozen=True)
-class Built:
-    """A spec, what was generated from it, and where its files belong."""
-
-    spec: Spec
-    generated: Generated
-    texts: Mapping[str, str]  # below the folder
-    folder: Path
-
-    @property
-    def files(self) -> dict[Path, str]:
-        return {self.folder / name: text for name, text in self.texts.items()}
 
 
 @click.command(

@@ -11,7 +11,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from kfgen.check import Outcome
-    from kfgen.commands.build import Built
+    from kfgen.commands.built import Built
     from kfgen.native.run import RunResult
     from kfgen.status import Status
 

@@ -63,7 +63,7 @@ _TITLES = {
     "code": ("code", ""),
     "history": (
         "history",
-        "`<name>_history.h`: the filter with its past. Ages count predictions; logs tell them in `<sensor>.age`, `.time`.",
+        "`<name>_history.h`: the filter with its past. Ages count predictions; a log has them in `<sensor>.age`.",
     ),
     "imm": ("imm", "The top of the spec is shared; a key of a mode replaces the top-level key whole."),
     "mode": ("imm.modes.<name>", ""),

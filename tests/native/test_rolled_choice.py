@@ -10,7 +10,8 @@ import pytest
 from emitted import problems
 from variants import call
 
-from kfgen.commands.build import Built, report
+from kfgen.commands.build import report
+from kfgen.commands.built import Built
 from kfgen.commands.tables import lines
 from kfgen.errors import SpecError
 from kfgen.generate import Generated, build
