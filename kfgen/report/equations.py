@@ -84,7 +84,25 @@ def symbolic(tree: Tree) -> Any:
     assert isinstance(tree, Call)
     if tree.op == "table":
         return sympy.Function("table")(symbolic(tree.args[0]))
+    if tree.op in _PARTS:
+        return _part(tree)
     return _CALLS[tree.op](*[symbolic(argument) for argument in tree.args])
+
+
+_PARTS = {"rotation": ("R", 2), "rotation_vector": ("log", 1), "from_rotation_vector": ("exp", 1)}
+"""Functions of which a tree has one entry: how they are called, and how many indices come first."""
+
+
+def _part(tree: Call) -> Any:
+    """One entry of a rotation's matrix, vector or quaternion, of the whole quaternion or vector where that has a name."""
+    called, indices = _PARTS[tree.op]
+    place = "".join(str(index.value + 1) for index in tree.args[:indices] if isinstance(index, Number))
+    rest = tree.args[indices:]
+    letters = "wxyz"[-len(rest) :]
+    of = {each.name.rpartition("_")[0] if isinstance(each, Name) else "" for each in rest}
+    if len(of) == 1 and of != {""} and [each.name[-1] for each in rest if isinstance(each, Name)] == list(letters):
+        return sympy.Function(f"{called}_{place}")(sympy.Symbol(of.pop()))
+    return sympy.Function(f"{called}_{place}")(*(symbolic(each) for each in rest))
 
 
 def _named(text: str) -> Callable[..., Any]:

@@ -30,10 +30,10 @@ def section(subject: Subject) -> Section | None:
 
 
 def shares(subject: Subject, drive: Drive) -> dict[str, dict[str, float]]:
-    """State -> source -> share of its variance; causes without a share are left out."""
+    """Error -> source -> share of its variance; causes without a share are left out."""
     walk, out = drive.walk, {}
     variances = np.einsum("sii->si", walk.parts)
-    for i, state in enumerate(subject.states):
+    for i, state in enumerate(subject.names):
         total = float(variances[:, i].sum())
         if total <= 0.0:  # known exactly from the start on
             out[state] = {"start": 1.0}
@@ -47,7 +47,7 @@ def _grid(subject: Subject, drive: Drive, found: dict[str, dict[str, float]]) ->
     variances = np.einsum("sii->i", drive.walk.parts)
     rows, bars = [], {}
     for r, (state, unit, variance) in enumerate(
-        zip(subject.states, [s.unit for s in subject.spec.states], variances, strict=True)
+        zip(subject.names, subject.units, variances, strict=True)
     ):
         row = [state, f"{figure(float(max(variance, 0.0)) ** 0.5, 3)} {unit}".strip()]
         for c, name in enumerate(used):

@@ -38,14 +38,14 @@ def section(subject: Subject) -> Section | None:
         )
         blocks.append(Note(text, "good" if size.verdict == "consistent" else "bad"))
     rows = []
-    for state in subject.spec.states:
-        if state.name in rmse:
-            each = rmse[state.name]
+    for name, unit in zip(subject.names, subject.units, strict=True):
+        if name in rmse:
+            each = rmse[name]
             ratio = each["rmse"] / each["sigma"] if each["sigma"] > 0 else None
             rows.append(
                 (
-                    state.name,
-                    state.unit,
+                    name,
+                    unit,
                     figure(each["rmse"]),
                     figure(each["sigma"]),
                     figure(ratio, 3),
@@ -84,7 +84,7 @@ def nees(drive: Drive, errors: Array) -> tuple[Array, NDArray[np.int64]]:
 
 def _rmse(subject: Subject, known: list[tuple[Drive, Array]]) -> dict[str, dict[str, float]]:
     out = {}
-    for i, name in enumerate(subject.states):
+    for i, name in enumerate(subject.names):
         e = np.concatenate([errors[:, i] for _, errors in known])
         var = np.concatenate([drive.sigma[:, i] ** 2 for drive, _ in known])
         there = np.isfinite(e)
