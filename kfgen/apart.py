@@ -38,7 +38,7 @@ def _shortest(d: Array, period: float | None) -> Array:
 
 
 def _turned(rotation: Rotation, a: Array, b: Array) -> Array:
-    """log(b^-1 a), or log(a b^-1) for an error in the reference frame [N, 3] (Sola, Deray & Atchuthan 2018, table 2)."""
+    """log(b^-1 a), or log(a b^-1) for an error in the reference frame [N, 3] (Sola 2017, section 4.4)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         a, b = (q / np.linalg.norm(q, axis=1, keepdims=True) for q in (a, b))
     w = np.einsum("ij,ij->i", a, b)

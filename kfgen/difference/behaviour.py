@@ -17,7 +17,6 @@ from kfgen.spec.sensors import late_columns
 if TYPE_CHECKING:
     from kfgen.difference.side import Side
     from kfgen.native import NativeFilter, RunResult
-    from kfgen.spec.types import Spec
 
 # what two builds of one filter need of each other to be called alike
 _CALLED = ("_t.", "_real_t", "_status_t", "_init", "_predict", "_update_", "_get_covariance")
@@ -26,7 +25,8 @@ _CALLED = ("_t.", "_real_t", "_status_t", "_init", "_predict", "_update_", "_get
 @dataclass(frozen=True)
 class Behaviour:
     """states: name -> the largest difference of x in the state's unit, the same in the old filter's standard
-    deviations, and the largest relative difference of its variance; of a quaternion the three of its error. calls: function -> rows whose status differs."""
+    deviations, and the largest relative difference of its variance; of a quaternion the three of its error. calls:
+    function -> rows whose status differs."""
 
     rows: int
     states: Mapping[str, tuple[float, float, float]]

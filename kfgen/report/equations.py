@@ -94,7 +94,7 @@ _PARTS = {"rotation": ("R", 2), "rotation_vector": ("log", 1), "from_rotation_ve
 
 
 def _part(tree: Call) -> Any:
-    """One entry of a rotation's matrix, vector or quaternion, of the whole quaternion or vector where that has a name."""
+    """One entry of a rotation's matrix, vector or quaternion; in terms of the whole where that has a name."""
     called, indices = _PARTS[tree.op]
     place = "".join(str(index.value + 1) for index in tree.args[:indices] if isinstance(index, Number))
     rest = tree.args[indices:]

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from kfgen.errors import KfgenError
 from kfgen.apart import differences
+from kfgen.errors import KfgenError
 from kfgen.logs import Log
 from kfgen.native.first import firsts
 from kfgen.native.run import Plan, RunResult, fixed_step, follow, plan
