@@ -77,7 +77,7 @@ class Objective:
 
     def scores(self, trials: Iterable[Sequence[float]]) -> list[Score]:
         """The scores of several trials, each a number per slot."""
-        wanted = [dict(zip(self.opened.names, map(float, trial), strict=True)) for trial in trials]
+        wanted = [self.opened.named(trial) for trial in trials]
         self.trials += len(wanted)
         jobs = [[self.pool.submit(self._one, numbers, drive) for drive in self.drives] for numbers in wanted]
         return [self._sum([job.result() for job in row]) for row in jobs]
@@ -96,7 +96,7 @@ class Objective:
         else is let in. It is smooth, and there it is as high as this one but for what the rejected ones count."""
         if not any(sensor.gate is not None for sensor in self.spec.measurements):
             return self
-        numbers = dict(zip(self.opened.names, map(float, trial), strict=True))
+        numbers = self.opened.named(trial)
         drives = []
         for drive in self.drives:
             result = self._one(numbers, drive)[0]
