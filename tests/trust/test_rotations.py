@@ -165,7 +165,7 @@ def late():
 
 def test_the_budget_is_all_of_the_covariance(late):
     """Causes through first measurements, turns, inputs of sensors and readings put back to where they were made."""
-    spec, _, log, _ = late
+    spec, _, log, kf = late
     kf.init()
     came = trace(kf, log)
     kf.init()
