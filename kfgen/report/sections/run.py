@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kfgen.plot import measured_as
+from kfgen.plot import beside, measured_as
 from kfgen.report.blocks import Block, Grid, Note, Picture, Section, figure
 from kfgen.report.figures import BAD, BAND, ESTIMATE, MEASURED, MODES, SMOOTH, TRUTH, few, picture, thin
 from kfgen.report.subject import Drive, Subject
@@ -72,7 +72,7 @@ def _state(subject: Subject, drive: Drive, i: int, key: str) -> Picture:
     state, period = subject.spec.states[i], subject.periods[i]
     t, x, spread = drive.trace.work.t, drive.x[:, i], subject.sigma(drive, i)
     sigma = np.zeros(len(t)) if spread is None else spread
-    truth = drive.log.columns.get(f"true.{state.name}")
+    truth = beside(subject.spec, drive.log, drive.x, state.name, f"true.{state.name}")
     smooth = None if drive.smoothed is None else drive.smoothed[:, i]
     lines = [x, sigma, np.full(len(t), np.nan) if truth is None else truth, x if smooth is None else smooth]
     points = max(120, min(500, 9000 // len(subject.states)))
@@ -87,9 +87,10 @@ def _state(subject: Subject, drive: Drive, i: int, key: str) -> Picture:
         if spread is not None:
             axes.fill_between(ts, xs - 2 * ss, xs + 2 * ss, color=BAND, alpha=0.35, linewidth=0, label="2 σ")
         for column in measured_as(subject.spec, state.name):
-            if column in drive.log.columns:
+            seen = beside(subject.spec, drive.log, drive.x, state.name, column)
+            if seen is not None:
                 axes.plot(
-                    *few(t, drive.log.columns[column], points),
+                    *few(t, seen, points),
                     ".",
                     color=MEASURED,
                     markersize=2,
