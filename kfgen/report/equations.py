@@ -21,6 +21,28 @@ class Cases(KfFunction):
     """where(condition, a, b)."""
 
 
+class Named(KfFunction):
+    """A function under the name that is its first argument, a symbol."""
+
+
+def _named_call(printer: Any, expression: Any) -> Any:
+    """f(a, b), f with an index where its name has one."""
+    dom = printer.dom
+    row = dom.createElement("mrow")
+
+    def sign(text: str) -> None:
+        mark = dom.createElement("mo")
+        mark.appendChild(dom.createTextNode(text))
+        row.appendChild(mark)
+
+    row.appendChild(printer._print(expression.args[0]))
+    for i, argument in enumerate(expression.args[1:]):
+        sign("," if i else "(")
+        row.appendChild(printer._print(argument))
+    sign(")")
+    return row
+
+
 def _cases(printer: Any, expression: Any) -> Any:
     """Cases as cases, a line each."""
     condition, yes, no = expression.args
@@ -47,6 +69,7 @@ def mathml(expression: Expression | Tree) -> str:
 def printed(expression: Any) -> str:
     printer = MathMLPresentationPrinter()
     printer._print_Cases = partial(_cases, printer)
+    printer._print_Named = partial(_named_call, printer)
     text: str = printer.doprint(expression)
     text = text.replace("<mo><</mo>", "<mo>&lt;</mo>").replace("<mo>></mo>", "<mo>&gt;</mo>")
     text = re.sub(r"<mo>([()])</mo>", r'<mo stretchy="false">\1</mo>', text)
@@ -101,12 +124,12 @@ def _part(tree: Call) -> Any:
     letters = "wxyz"[-len(rest) :]
     of = {each.name.rpartition("_")[0] if isinstance(each, Name) else "" for each in rest}
     if len(of) == 1 and of != {""} and [each.name[-1] for each in rest if isinstance(each, Name)] == list(letters):
-        return sympy.Function(f"{called}_{place}")(sympy.Symbol(of.pop()))
-    return sympy.Function(f"{called}_{place}")(*(symbolic(each) for each in rest))
+        return _named(f"{called}_{place}")(sympy.Symbol(of.pop()))
+    return _named(f"{called}_{place}")(*(symbolic(each) for each in rest))
 
 
 def _named(text: str) -> Callable[..., Any]:
-    return lambda *arguments: sympy.Function(text)(*arguments)
+    return lambda *arguments: Named(sympy.Symbol(text), *arguments)
 
 
 _CALLS: dict[str, Callable[..., Any]] = {

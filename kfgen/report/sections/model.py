@@ -40,13 +40,7 @@ def section(subject: Subject) -> Section:
             continue
         blocks += _sensing(mode, title)
     if spec.initialize:
-        first = [
-            (rule.sensor, target, plain(formula.text))
-            for rule in spec.initialize
-            for what, given in (("{}", rule.states), ("var {}", rule.variance))
-            for target, formula in ((what.format(each), formula) for each, formula in given.items())
-        ]
-        blocks.append(Grid("First measurements", ("of", "sets", "to"), first))
+        blocks.append(Grid("First measurements", ("of", "sets", "to"), list(dict.fromkeys(_firsts(spec)))))
     if spec.outputs:
         blocks.append(Equations("Outputs", [equation(name(each.name), each.value) for each in spec.outputs]))
     return Section("Model", blocks, {"model": _data(spec)})
@@ -83,6 +77,15 @@ def _states(spec: Spec) -> Grid:
     head = ("state", "unit", "kind", "starts at", "± 1 σ", "range", "meaning")
     count = f"{len(spec.states)}" + (f", with {len(spec.errors)} errors" if spec.rotations else "")
     return Grid(f"States ({count})", head, rows, right=(3, 4))
+
+
+def _firsts(spec: Spec) -> Iterator[tuple[str, str, str]]:
+    """Sensor, what it sets, and to what: of a vector as it is written."""
+    for rule in spec.initialize:
+        for what, given in (("", rule.states), ("var ", rule.variance)):
+            for each, formula in given.items():
+                written = formula.place.path.rpartition(".")[2] or each
+                yield rule.sensor, what + written, plain(formula.text)
 
 
 def _value(spec: Spec, expression: Expression | None) -> float | None:
