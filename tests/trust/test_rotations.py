@@ -180,6 +180,8 @@ def test_the_budget_is_all_of_the_covariance(late):
     for name in ("star", "fix"):
         mine = in_time.nis[(in_time.sensor == list(kf.sensors).index(name)) & np.isfinite(in_time.nis)]
         np.testing.assert_allclose(np.nansum(walk.innovations[name].e ** 2, axis=1), mine, rtol=1e-6)
+    last = [runs.nis[runs.sensor == list(kf.sensors).index("star")] for runs in (came, in_time)]
+    np.testing.assert_allclose(*last, rtol=1e-9)  # all that is known of its time has come before it
 
 
 def test_late_readings_are_smoothed_where_they_were_made(late):
