@@ -16,7 +16,7 @@ from kfgen.files import write_all
 from kfgen.logs import Log
 from kfgen.spec.constants import value
 from kfgen.spec.tree import Name
-from kfgen.spec.types import Spec
+from kfgen.spec.types import Output, Spec
 
 if TYPE_CHECKING:
     from kfgen.native.run import RunResult
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 ESTIMATE, BAND, MEASURED, TRUTH = "#1f5fa8", "#9dc1e8", "#d9822b", "#2f2f2f"
-_POSITIONS = (("px", "py"), ("x", "y"), ("pn", "pe"), ("east", "north"), ("e", "n"), ("pos_x", "pos_y"))
+_POSITIONS = (("px", "py"), ("x", "y"), ("pn", "pe"), ("east", "north"), ("e", "n"), ("pos_x", "pos_y"),
+              ("p_x", "p_y"), ("p_e", "p_n"), ("p_east", "p_north"), ("pos_e", "pos_n"))  # fmt: skip
 _MOST_POINTS = 20_000
 
 
@@ -37,8 +38,8 @@ def require_matplotlib() -> None:
 def draw(path: Path, spec: Spec, log: Log, result: RunResult) -> None:
     """Draw a run into `path`, whose ending chooses the format (png, svg, pdf); KfgenError for another.
 
-    One panel a state over time; states that are two coordinates of a position (px, py; x, y; east, north)
-    have a panel of their track; a bank has its modes' probabilities.
+    One panel a state over time, and one an output; states that are two coordinates of a position (px, py; x, y; east,
+    north) have a panel of their track; a bank has its modes' probabilities.
     """
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -49,7 +50,7 @@ def draw(path: Path, spec: Spec, log: Log, result: RunResult) -> None:
     if form not in known:
         raise KfgenError(f"{path}: cannot draw a .{form} file; end it in .png, .svg or .pdf")
     track = position(spec)
-    panels = len(spec.states) + (result.mu is not None)
+    panels = len(spec.states) + len(spec.outputs) + (result.mu is not None)
     rows = max(panels, 3) if track else panels
     size = (14.0 if track else 9.0, min(1.0 + 1.75 * rows, 60.0))
     figure = Figure(figsize=size, dpi=110, layout="constrained")
@@ -61,8 +62,12 @@ def draw(path: Path, spec: Spec, log: Log, result: RunResult) -> None:
         axes = figure.add_subplot(grid[i, 0], sharex=first)
         first = first or axes
         _state(axes, spec, log, result, i, keep)
+    for i, output in enumerate(spec.outputs):
+        axes = figure.add_subplot(grid[len(spec.states) + i, 0], sharex=first)
+        first = first or axes
+        _output(axes, output, result, keep)
     if result.mu is not None and spec.imm is not None:
-        axes = figure.add_subplot(grid[len(spec.states), 0], sharex=first)
+        axes = figure.add_subplot(grid[panels - 1, 0], sharex=first)
         _modes(axes, [mode.name for mode in spec.imm.modes], result.t[keep], result.mu[keep])
     figure.align_ylabels(figure.axes)
     states = figure.axes[: len(spec.states)]
@@ -111,6 +116,26 @@ def measured_as(spec: Spec, state: str) -> list[str]:
     ]
 
 
+def beside(spec: Spec, log: Log, x: Array, state: str, column: str) -> Array | None:
+    """A column of a log that tells of a state, beside estimates x [N, nx]; None where there is none.
+
+    q and -q are one rotation: the numbers of a quaternion are those of the two that is nearer to the estimate.
+    """
+    values = log.columns.get(column)
+    mine = next((rotation.parts for rotation in spec.rotations if state in rotation.parts), None)
+    if values is None or mine is None:
+        return values
+    head, _, part = column.partition(".")
+    measured = [rotation.parts for sensor in spec.measurements if sensor.name == head for rotation in sensor.rotations]
+    theirs = mine if head == "true" else next((parts for parts in measured if part in parts), None)
+    if theirs is None or any(f"{head}.{each}" not in log.columns for each in theirs):
+        return values
+    names = [each.name for each in spec.states]
+    whole = np.column_stack([log.columns[f"{head}.{each}"] for each in theirs])
+    side = np.einsum("ij,ij->i", x[:, [names.index(each) for each in mine]], whole)
+    return np.where(side < 0, -values, values)
+
+
 def _thinned(rows: int) -> slice:
     return slice(None, None, max(1, math.ceil(rows / _MOST_POINTS)))
 
@@ -124,14 +149,25 @@ def _state(axes: Any, spec: Spec, log: Log, result: RunResult, i: int, keep: sli
         sigma = np.sqrt(np.maximum(result.var[keep, spec.errors.index(state.name)], 0.0))
     axes.fill_between(t, x - 2 * sigma, x + 2 * sigma, color=BAND, alpha=0.55, linewidth=0, label="2 sigma")
     for column in measured_as(spec, state.name):
-        if column in log.columns:
-            _dots(axes, result.t, log.columns[column])
-    truth = log.columns.get(f"true.{state.name}")
+        measured = beside(spec, log, result.x, state.name, column)
+        if measured is not None:
+            _dots(axes, result.t, measured)
+    truth = beside(spec, log, result.x, state.name, f"true.{state.name}")
     if truth is not None:
         axes.plot(t, _unbroken(truth[keep], period), color=TRUTH, linewidth=1.0, linestyle="--", label="truth")
     axes.plot(t, _unbroken(x, period), color=ESTIMATE, linewidth=1.3, label="estimate")
     axes.set_ylabel(state.name + (f" [{state.unit}]" if state.unit else ""))
     _focus(axes, x, sigma, truth)
+    _plain(axes)
+
+
+def _output(axes: Any, output: Output, result: RunResult, keep: slice) -> None:
+    t, value = result.t[keep], result.outputs[output.name][keep]
+    deviation = result.output_std[output.name][keep]
+    axes.fill_between(t, value - 2 * deviation, value + 2 * deviation, color=BAND, alpha=0.55, linewidth=0)
+    axes.plot(t, value, color=ESTIMATE, linewidth=1.3)
+    axes.set_ylabel(output.name + (f" [{output.unit}]" if output.unit else ""))
+    _focus(axes, value, deviation, None)
     _plain(axes)
 
 

@@ -37,7 +37,8 @@ def smooth(spec: Path, log: Path, out: Path | None, any_rate: bool, renamed: Pat
     its sigma-point form). In numpy, for what is done after a drive: nothing of it is emitted.
 
     The log is read and the columns are written as `kfgen run` does; nis and status are those of the filter on its way
-    forwards. Refused: imm, ekf2, adapt_R, adapt_Q, each with the reason. Exit status 1 where each update failed.
+    forwards. Late readings are taken in where they were made. Refused: imm, ekf2, adapt_R, adapt_Q, each with the
+    reason. Exit status 1 where each update failed.
     """
     from kfgen import logs, smoothing
     from kfgen.commands.run import columns

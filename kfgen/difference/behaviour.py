@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kfgen.apart import differences
 from kfgen.difference.interface import changes
 from kfgen.errors import KfgenError
-from kfgen.geometry import part_of
 from kfgen.logs import Log, needed_columns
+from kfgen.spec.sensors import late_columns
 
 if TYPE_CHECKING:
     from kfgen.difference.side import Side
     from kfgen.native import NativeFilter, RunResult
-    from kfgen.spec.types import Spec
 
 # what two builds of one filter need of each other to be called alike
 _CALLED = ("_t.", "_real_t", "_status_t", "_init", "_predict", "_update_", "_get_covariance")
@@ -25,7 +25,8 @@ _CALLED = ("_t.", "_real_t", "_status_t", "_init", "_predict", "_update_", "_get
 @dataclass(frozen=True)
 class Behaviour:
     """states: name -> the largest difference of x in the state's unit, the same in the old filter's standard
-    deviations, and the largest relative difference of its variance. calls: function -> rows whose status differs."""
+    deviations, and the largest relative difference of its variance; of a quaternion the three of its error. calls:
+    function -> rows whose status differs."""
 
     rows: int
     states: Mapping[str, tuple[float, float, float]]
@@ -46,8 +47,7 @@ def behave(old: Side, new: Side, log: Log) -> Behaviour:
         if apart:
             raise KfgenError(f"{side.title} is called otherwise: {', '.join(apart[:4])}")
     before, after = (_run(side, log) for side in (old, new))
-    names = [name for name in before[0].states if name in after[0].states]
-    states = {name: _difference(name, before, after) for name in names}
+    states = _differences(before, after)
     both = [function for function in before[1].calls if function in after[1].calls]
     counts = {name: int(np.count_nonzero(before[1].calls[name] != after[1].calls[name])) for name in both}
     return Behaviour(log.rows, states, {name: count for name, count in counts.items() if count})
@@ -64,32 +64,35 @@ def _run(side: Side, log: Log) -> tuple[NativeFilter, RunResult]:
     missing = [name for name in needed_columns(spec, log.columns) if name not in log.columns]
     if missing:
         raise KfgenError(f"the track has no column `{missing[0]}`, which {side.title} needs; give one with --log")
-    (kf,) = load_filters([side.generated])
+    late = spec.history is not None and any(name in log.columns for name in late_columns(spec))
+    (kf,) = load_filters([side.generated], history=late)
     return kf, kf.run(replace(log))
 
 
-def _difference(
-    name: str, before: tuple[NativeFilter, RunResult], after: tuple[NativeFilter, RunResult]
-) -> tuple[float, float, float]:
-    i, j = before[0].states.index(name), after[0].states.index(name)
+def _differences(
+    before: tuple[NativeFilter, RunResult], after: tuple[NativeFilter, RunResult]
+) -> dict[str, tuple[float, float, float]]:
+    """Of the states that both have, a quaternion's by its error as the old filter has it."""
+    spec, found = before[0].spec, {}
+    known, states = set(after[0].states), after[0].states
+    shared = np.full((len(after[1].x), len(spec.states)), np.nan)
+    for i, state in enumerate(spec.states):
+        if state.name in known:
+            shared[:, i] = after[1].x[:, states.index(state.name)]
+    errors = after[0].spec.errors
     with np.errstate(all="ignore"):
-        period = _period(before[0].spec, i)
-        local = part_of(period).local
-        x = np.abs([local(float(a), float(b)) for a, b in zip(after[1].x[:, j], before[1].x[:, i], strict=True)])
-        variance = before[1].var[:, i]
-        sigma = np.where(x == 0, 0.0, x / np.sqrt(variance))
-        apart = np.abs(after[1].var[:, j] - variance)
-        relative = np.where(apart == 0, 0.0, apart / variance)
-    return _largest(x), _largest(sigma), _largest(relative)
+        apart = np.abs(differences(spec, shared, before[1].x))
+        for i, name in enumerate(spec.errors):
+            if name not in errors:
+                continue
+            x, variance = apart[:, i], before[1].var[:, i]
+            moved = np.abs(after[1].var[:, errors.index(name)] - variance)
+            sigma = np.where(x == 0, 0.0, x / np.sqrt(variance))
+            relative = np.where(moved == 0, 0.0, moved / variance)
+            found[name] = _largest(x), _largest(sigma), _largest(relative)
+    return found
 
 
 def _largest(values: Any) -> float:
     """NaN is the largest of all."""
     return float(np.max(np.where(np.isnan(values), np.inf, values), initial=0.0))
-
-
-def _period(spec: Spec, i: int) -> float | None:
-    from kfgen.spec.constants import value
-
-    period = spec.states[i].period
-    return None if period is None else float(value(period.tree, spec))

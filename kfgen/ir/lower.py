@@ -115,7 +115,7 @@ class Lowering:
         """A function of one argument; of a plain symbol it is kept under its name: `sin_th`."""
         value = self.trace.function(op, self(argument))
         if argument.is_Symbol and op in _SHORT_NAMES:
-            self.trace.name(value, f"{op}_{argument.name}")
+            self.trace.name(value, f"{op}_{argument.name}".replace(".", "_"))  # an entry of a rotation has a dot
         return value
 
     def _call(self, e: Any) -> Value:

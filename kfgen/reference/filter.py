@@ -89,16 +89,17 @@ class ReferenceFilter:
     def outputs(self) -> dict[str, float]:
         """The spec's outputs at x, by name."""
         self._require("outputs", bool(self.spec.outputs), "outputs")
-        return self._outputs.values(self._estimate, self._now)
+        return self._outputs.values(self._estimate, self.now)
 
     @property
     def output_std(self) -> dict[str, float]:
         """Their standard deviations, to first order."""
         self._require("output_std", bool(self.spec.outputs), "outputs")
-        return self._outputs.deviations(self._estimate, self._now)
+        return self._outputs.deviations(self._estimate, self.now)
 
     @property
-    def _now(self) -> Context:
+    def now(self) -> Context:
+        """What an output is told beside the estimate."""
         step = math.nan if self._fixed is None else float(self._fixed)
         return Context(self.parameters, np.zeros(len(self.model.inputs)), self._clock.now, step)
 

@@ -8,19 +8,20 @@ Rotations are smoothed in the tangent space, each covariance as it is seen from 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kfgen.errors import KfgenError
-from kfgen.reference.algorithm import Passage
+from kfgen.reference.algorithm import Estimate, Passage
 from kfgen.reference.build import reference
 from kfgen.reference.dual import Matrix, Vector
 from kfgen.reference.filter import ReferenceFilter
 from kfgen.reference.linalg import EPS, symmetric
 from kfgen.reference.log import Run, replay
-from kfgen.reference.model import Model, wrap
+from kfgen.reference.model import Context, Model, wrap
+from kfgen.reference.outputs import Outputs
 from kfgen.reference.sensor import SensorModel
 from kfgen.reference.status import Status
 from kfgen.spec.sensors import filter_of
@@ -32,12 +33,14 @@ class Smoothed:
     """Estimates that know all of a log of r rows.
 
     x (r, nx), P (r, n, n): after each row, in the spec's order; rows between which nothing was predicted share one.
-    run: the filter's own course.
+    run: the filter's own course. outputs, output_std: name -> (r), what the spec's `outputs` are of them.
     """
 
     x: Matrix
     P: NDArray[np.float64]
     run: Run
+    outputs: Mapping[str, Vector] = field(default_factory=dict)
+    output_std: Mapping[str, Vector] = field(default_factory=dict)
 
     @property
     def var(self) -> Matrix:
@@ -77,7 +80,7 @@ class _Forward:
     def predict(self, u: ArrayLike | None = None, dt: float | None = None) -> int:
         before = self.kf.estimate
         status = self.kf.predict(u, dt)
-        if status < Status.ERROR:
+        if status < Status.ERROR and self.kf.estimate is not before:  # it may wait for a first measurement
             passage = self.kf.estimate.passage
             assert passage is not None
             self.before.append((before.x, before.P))
@@ -116,14 +119,13 @@ def refusals(spec: Spec) -> Iterator[str]:
     for name in ("adapt_R", "adapt_Q"):
         if any(getattr(each, name) is not None for each in options):
             yield f"{name}: covariances learnt on the way are not those that hold for the way back; smooth without it"
-    if any(getattr(sensor, "delayed", False) for sensor in spec.measurements):
-        yield "delayed: a late measurement corrects a moment that lies behind; give the log its own times instead"
 
 
 def smooth(spec: Spec, log: Mapping[str, ArrayLike], seen: Callable[[int], None] = lambda row: None) -> Smoothed:
     """Smooths a log, which is read as `kfgen.reference.log.replay` reads it, from the spec's start.
 
-    seen: called with each row that the filter has done. KfgenError where a spec cannot be smoothed, with the reasons.
+    A late measurement stands in the log where it was made. seen: called with each row that the filter has done.
+    KfgenError where a spec cannot be smoothed, with the reasons.
     """
     reasons = list(refusals(spec))
     if reasons:
@@ -131,14 +133,22 @@ def smooth(spec: Spec, log: Mapping[str, ArrayLike], seen: Callable[[int], None]
     kf = reference(spec)
     forward = _Forward(kf)
     legs: list[int] = []  # of each row: how many predictions came before its end
+    moments: list[Context] = []
 
     def passed(row: int) -> None:
         legs.append(len(forward.passages))
+        moments.append(kf.now)
         seen(row)
 
     run = replay(forward, log, passed)
     x, P = _backward(kf.model, forward, kf.x, kf.P)
-    return Smoothed(x[legs], P[legs], run)
+    told = Outputs(kf.model)
+    places = list(zip((Estimate(x[k], P[k]) for k in legs), moments, strict=True)) if told.names else []
+    values = [told.values(*place) for place in places]
+    deviations = [told.deviations(*place) for place in places]
+    return Smoothed(x[legs], P[legs], run, *(
+        {name: np.array([row[name] for row in rows]) for name in told.names} for rows in (values, deviations)
+    ))  # fmt: skip
 
 
 def _backward(model: Model, forward: _Forward, x: Vector, P: Matrix) -> tuple[Matrix, NDArray[np.float64]]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from kfgen.errors import KfgenError
 from kfgen.logs import Log, Source, as_log
+from kfgen.spec.sensors import late_columns
 from kfgen.spec.types import Spec
 
 ROWS = 500  # of the log that is drawn where none is given
@@ -75,7 +76,9 @@ def _drives(generated: Any, named: Sequence[tuple[str, Log]], progress: Any) -> 
     from kfgen.native import load_filters
     from kfgen.report.subject import drive
 
-    kf = load_filters([generated])[0]
+    spec = generated.spec
+    late = spec.history is not None and any(set(late_columns(spec)) & set(log.columns) for _, log in named)
+    (kf,) = load_filters([generated], history=late)
     return [drive(generated.spec, kf, log, title, progress) for title, log in named]
 
 

@@ -21,6 +21,28 @@ class Cases(KfFunction):
     """where(condition, a, b)."""
 
 
+class Named(KfFunction):
+    """A function under the name that is its first argument, a symbol."""
+
+
+def _named_call(printer: Any, expression: Any) -> Any:
+    """f(a, b), f with an index where its name has one."""
+    dom = printer.dom
+    row = dom.createElement("mrow")
+
+    def sign(text: str) -> None:
+        mark = dom.createElement("mo")
+        mark.appendChild(dom.createTextNode(text))
+        row.appendChild(mark)
+
+    row.appendChild(printer._print(expression.args[0]))
+    for i, argument in enumerate(expression.args[1:]):
+        sign("," if i else "(")
+        row.appendChild(printer._print(argument))
+    sign(")")
+    return row
+
+
 def _cases(printer: Any, expression: Any) -> Any:
     """Cases as cases, a line each."""
     condition, yes, no = expression.args
@@ -47,6 +69,7 @@ def mathml(expression: Expression | Tree) -> str:
 def printed(expression: Any) -> str:
     printer = MathMLPresentationPrinter()
     printer._print_Cases = partial(_cases, printer)
+    printer._print_Named = partial(_named_call, printer)
     text: str = printer.doprint(expression)
     text = text.replace("<mo><</mo>", "<mo>&lt;</mo>").replace("<mo>></mo>", "<mo>&gt;</mo>")
     text = re.sub(r"<mo>([()])</mo>", r'<mo stretchy="false">\1</mo>', text)
@@ -85,11 +108,29 @@ def symbolic(tree: Tree) -> Any:
     assert isinstance(tree, Call)
     if tree.op == "table":
         return sympy.Function("table")(symbolic(tree.args[0]))
+    if tree.op in _PARTS:
+        return _part(tree)
     return _CALLS[tree.op](*[symbolic(argument) for argument in tree.args])
 
 
+_PARTS = {"rotation": ("R", 2), "rotation_vector": ("log", 1), "from_rotation_vector": ("exp", 1)}
+"""Functions of which a tree has one entry: how they are called, and how many indices come first."""
+
+
+def _part(tree: Call) -> Any:
+    """One entry of a rotation's matrix, vector or quaternion; in terms of the whole where that has a name."""
+    called, indices = _PARTS[tree.op]
+    place = "".join(str(index.value + 1) for index in tree.args[:indices] if isinstance(index, Number))
+    rest = tree.args[indices:]
+    letters = "wxyz"[-len(rest) :]
+    of = {each.name.rpartition("_")[0] if isinstance(each, Name) else "" for each in rest}
+    if len(of) == 1 and of != {""} and [each.name[-1] for each in rest if isinstance(each, Name)] == list(letters):
+        return _named(f"{called}_{place}")(sympy.Symbol(of.pop()))
+    return _named(f"{called}_{place}")(*(symbolic(each) for each in rest))
+
+
 def _named(text: str) -> Callable[..., Any]:
-    return lambda *arguments: sympy.Function(text)(*arguments)
+    return lambda *arguments: Named(sympy.Symbol(text), *arguments)
 
 
 _CALLS: dict[str, Callable[..., Any]] = {

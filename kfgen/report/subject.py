@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kfgen.apart import differences
 from kfgen.errors import KfgenError
-from kfgen.geometry import part_of
 from kfgen.logs import Log
+from kfgen.native.settled import settled
 from kfgen.native.trace import Trace, trace
 from kfgen.report.walk import Walk, Walker
 from kfgen.spec.constants import value
+from kfgen.spec.sensors import degrees_of
 from kfgen.spec.types import Spec
 
 if TYPE_CHECKING:
@@ -30,7 +32,8 @@ ANALYSED = 4000
 
 @dataclass(frozen=True)
 class Drive:
-    """A log and what the filter made of it. smoothed [r, n]: by all of it, None where it cannot be."""
+    """A log and what the filter made of it. walk: with late readings where they were made. smoothed [r, nx]: by all of
+    it, None where it cannot be."""
 
     title: str
     log: Log
@@ -40,7 +43,7 @@ class Drive:
 
     @cached_property
     def x(self) -> Array:
-        """After each row [r, n]."""
+        """After each row [r, nx]."""
         return self.trace.x[self.trace.last()]
 
     @cached_property
@@ -50,7 +53,7 @@ class Drive:
 
     @cached_property
     def sigma(self) -> Array:
-        """Standard deviations after each row [r, n]."""
+        """Standard deviations of the errors after each row [r, n]."""
         sigma: Array = np.sqrt(np.maximum(np.einsum("kii->ki", self.P), 0.0))
         return sigma
 
@@ -71,41 +74,53 @@ class Subject:
     def states(self) -> list[str]:
         return [state.name for state in self.spec.states]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The coordinates of the error [n]: states, and three of each rotation."""
+        return self.spec.errors
+
+    @property
+    def units(self) -> list[str]:
+        """Of the errors."""
+        units = {state.name: state.unit for state in self.spec.states}
+        return [units.get(name, "rad") for name in self.names]
+
     @cached_property
     def periods(self) -> list[float | None]:
         return [None if s.period is None else float(value(s.period.tree, self.spec)) for s in self.spec.states]
 
     def errors(self, drive: Drive) -> Array:
         """Estimate less truth after each row [r, n], NaN where the log has none; angles the shortest way."""
-        out = np.full(drive.x.shape, np.nan)
-        for i, (name, period) in enumerate(zip(self.states, self.periods, strict=True)):
-            truth = drive.log.columns.get(f"true.{name}")
-            if truth is None:
-                continue
-            part = part_of(period)
-            out[:, i] = drive.x[:, i] - truth
-            if not part.flat:
-                out[:, i] = [part.local(a, b) for a, b in zip(drive.x[:, i].tolist(), truth.tolist(), strict=True)]
-        return out
+        absent = np.full(len(drive.x), np.nan)
+        truth = np.column_stack([drive.log.columns.get(f"true.{name}", absent) for name in self.states])
+        return differences(self.spec, drive.x, truth)
+
+    def sigma(self, drive: Drive, state: int) -> Array | None:
+        """The standard deviation of a state after each row [r]; None for a number of a quaternion, which has none."""
+        name = self.states[state]
+        return drive.sigma[:, self.names.index(name)] if name in self.names else None
 
     def degrees(self, drive: Drive, sensor: int) -> NDArray[np.int64]:
-        """Components that each call of a trace used of a sensor; 0 for other calls and those that only initialise."""
+        """Degrees of freedom that each call of a trace used of a sensor; 0 for others and those that only set."""
         work, calls = drive.trace.work, drive.trace
-        mine = calls.sensor == sensor
+        mine = (calls.sensor == sensor) & calls.updates
         out = np.zeros(len(calls.row), np.int64)
-        out[mine] = [int(bits).bit_count() for bits in work.mask[calls.row[mine], sensor].tolist()]
-        if self.spec.measurements[sensor].name in [rule.sensor for rule in self.spec.initialize]:
-            full = np.flatnonzero(mine & (calls.nis == 0.0))
-            out[full[:1]] = 0
+        whole = self.spec.measurements[sensor]
+        out[mine] = [degrees_of(whole, bits) for bits in work.mask[calls.row[mine], sensor].tolist()]
         return out
 
 
 def drive(spec: Spec, kf: Any, log: Log, title: str, progress: Progress) -> Drive:
     """Run, linearise and smooth a log."""
     kf.init()
-    found = trace(kf, log)
-    rows = min(ANALYSED, log.rows)
-    walk = Walker(spec, found).walk(rows, lambda row: progress(row, rows, f"linearising {title}"))
+    found = in_time = trace(kf, log)
+    if spec.history is not None and found.work.age.any():
+        kf.init()
+        in_time = trace(kf, settled(found.work, spec.history.steps).work)
+    rows = min(ANALYSED, len(in_time.work.t))
+    walk = Walker(spec, in_time).walk(rows, lambda row: progress(row, rows, f"linearising {title}"))
+    if rows == len(in_time.work.t):
+        walk.rows = log.rows
     smoothed = None
     if log.rows <= ANALYSED:
         from kfgen.smoothing import smoothed as smooth

@@ -33,7 +33,7 @@ from kfgen.reference.steady import Steady
 from kfgen.reference.ukf import Ukf
 from kfgen.scalar_names import DOUBLE
 from kfgen.spec.modes import mode_specs
-from kfgen.spec.tree import names
+from kfgen.spec.sensors import in_use, readings_of
 from kfgen.spec.types import Spec
 
 Array = NDArray[np.float64]
@@ -45,11 +45,11 @@ FAR = 1e12  # of the transition from the start: an unstable model is watched unt
 class Innovations:
     """Of one sensor, k of them in order.
 
-    row [k]. y, sigma, e [k, m]: as they were, their standard deviations, and whitened by the root of their covariance;
-    NaN for components that were not used. taken [k]: whether the filter took them.
+    t [k]. y, sigma, e [k, m]: as they were, their standard deviations, and whitened by the root of their covariance;
+    of a quaternion three. NaN for components that were not used. taken [k]: whether the filter took them.
     """
 
-    row: NDArray[np.int64]
+    t: Array
     y: Array
     sigma: Array
     e: Array
@@ -78,7 +78,7 @@ class Walk:
 
 @dataclass
 class _Seen:
-    row: list[int] = field(default_factory=list)
+    t: list[float] = field(default_factory=list)
     y: list[Array] = field(default_factory=list)
     sigma: list[Array] = field(default_factory=list)
     e: list[Array] = field(default_factory=list)
@@ -100,14 +100,12 @@ class Walker:
         self.sources = ("start", *(f"sensor.{name}" if name == "start" else name for name in sensors), *self.own)
         self.seen = {name: _Seen() for name in sensors}
         self.H: dict[str, list[Array]] = {name: [] for name in sensors}
-        widths = [len(sensor.components) for sensor in spec.measurements]
-        self.first = np.cumsum([0, *widths])
-        self.H_used = {name: np.zeros((m, self.n), bool) for name, m in zip(sensors, widths, strict=True)}
+        self.places = [place for _, place in readings_of(spec)]
+        self.H_used = {sensor.name: np.zeros((len(sensor.errors), self.n), bool) for sensor in spec.measurements}
         self.F_used = np.zeros((self.n, self.n), bool)
         self.Q_used = np.zeros((self.n, self.n), bool)
         self.parts = np.zeros((len(self.sources), self.n, self.n))
         self.onward: Array | None = np.eye(self.n)
-        self.awaited = [rule.sensor for rule in spec.initialize]
         self.skipped = 0
 
     def walk(self, rows: int, progress: Callable[[int], None] = lambda row: None) -> Walk:
@@ -118,6 +116,8 @@ class Walker:
         accepted = trace.accepted
         for c in range(int(np.searchsorted(trace.row, rows))):
             row = int(trace.row[c])
+            if trace.waiting[c]:
+                continue
             mode = 0 if trace.mu is None else int(np.argmax(trace.mu[max(c - 1, 0)]))
             u = trace.work.u[row]
             try:
@@ -158,38 +158,42 @@ class Walker:
         i, row = int(trace.sensor[c]), int(trace.row[c])
         name = self.spec.measurements[i].name
         sensor = kf.sensors[name]
-        z = trace.work.z[row, self.first[i] : self.first[i + 1]]
-        used = tuple(k for k in range(sensor.m) if int(trace.work.mask[row, i]) >> k & 1)
-        reading = Reading(sensor, z, used, context)
-        if self._initialises(name, used) and accepted:
-            self.awaited.remove(name)
+        z, own = np.split(trace.work.z[row, self.places[i]], [sensor.m])
+        used = in_use(self.spec.measurements[i], int(trace.work.mask[row, i]))
+        if not used:
             return
+        if trace.setting[c]:
+            self._begin(c, i)
+            return
+        reading = Reading(sensor, sensor.space.normalised(z), used, replace(context, own=own))
         algorithm = kf.algorithm.of(name)
         start = algorithm.initial()
         detail = algorithm.innovate(Estimate(trace.x[c], trace.P[c], adapted=start.adapted), reading).detail
         y, S, H, R = self._pieces(algorithm, detail, trace.x[c], trace.P[c], reading)
-        self._see(name, row, used, sensor.m, y, S, accepted)
+        self._see(name, float(trace.work.t[row]), reading, y, S, accepted)
         if not accepted:
             return
         assert isinstance(algorithm, (Ekf, Ukf))
         rules = replace(algorithm.treatment.rules(context), influence=None, chi2=None)
         P = algorithm.turns[name].P if isinstance(algorithm, Steady) else symmetric(self.parts.sum(axis=0))
-        K = np.column_stack([update(P, H, R, e, rules).dx for e in np.eye(len(used))])
-        A = np.eye(self.n) - K @ H
+        K = np.column_stack([update(P, H, R, e, rules).dx for e in np.eye(len(y))])
+        space = self.model.space
+        T = space.turned(space.difference(trace.x[c + 1], trace.x[c]), always=False)  # to where the estimate now is
+        A = T @ (np.eye(self.n) - K @ H)
         self.parts = A @ self.parts @ A.T
-        self.parts[1 + i] += K @ R @ K.T
-        self.H_used[name][list(used)] |= H != 0
+        self.parts[1 + i] += T @ K @ R @ K.T @ T.T
+        self.H_used[name][list(reading.rows)] |= H != 0
         if self.onward is not None:
             size = np.sqrt(np.maximum(np.diag(R), 0.0))
             self.H[name].append(H @ self.onward / np.where(size > 0, size, 1.0)[:, None])
 
-    def _initialises(self, name: str, used: tuple[int, ...]) -> bool:
-        if name not in self.awaited:
-            return False
-        (rule,) = (each for each in self.spec.initialize if each.sensor == name)
-        components = self.filters[0].sensors[name].components
-        needed = {word for formula in rule.states.values() for word in names(formula.tree)} & set(components)
-        return all(components.index(each) in used for each in needed)
+    def _begin(self, c: int, i: int) -> None:
+        """A first measurement: the variances that it sets come from it."""
+        (rule,) = (each for each in self.spec.initialize if each.sensor == self.spec.measurements[i].name)
+        for name in rule.variance:
+            k = self.spec.errors.index(name)
+            self.parts[:, k, :] = self.parts[:, :, k] = 0.0
+            self.parts[1 + i, k, k] = self.trace.P[c + 1, k, k]
 
     def _pieces(
         self, algorithm: object, detail: object, x: Array, P: Array, reading: Reading
@@ -207,8 +211,8 @@ class Walker:
         turn = algorithm.turns[reading.sensor.name]
         return detail, turn.H @ turn.P @ turn.H.T + turn.R, turn.H, turn.R
 
-    def _see(self, name: str, row: int, used: tuple[int, ...], m: int, y: Array, S: Array, taken: bool) -> None:
-        seen = self.seen[name]
+    def _see(self, name: str, t: float, reading: Reading, y: Array, S: Array, taken: bool) -> None:
+        seen, m = self.seen[name], reading.sensor.space.k
         sigma = np.sqrt(np.maximum(np.diag(S), 0.0))
         try:
             e = np.linalg.solve(np.linalg.cholesky(S), y)
@@ -216,12 +220,12 @@ class Walker:
             e = np.divide(y, sigma, out=np.full(len(y), np.nan), where=sigma > 0)
         for store, values in ((seen.y, y), (seen.sigma, sigma), (seen.e, e)):
             whole = np.full(m, np.nan)
-            whole[list(used)] = values
+            whole[list(reading.rows)] = values
             store.append(whole)
-        seen.row.append(row)
+        seen.t.append(t)
         seen.taken.append(taken)
 
     def _innovations(self, name: str) -> Innovations:
         seen, m = self.seen[name], len(self.H_used[name])
         y, sigma, e = (np.array(each).reshape(-1, m) for each in (seen.y, seen.sigma, seen.e))
-        return Innovations(np.array(seen.row, np.int64), y, sigma, e, np.array(seen.taken, bool))
+        return Innovations(np.array(seen.t), y, sigma, e, np.array(seen.taken, bool))

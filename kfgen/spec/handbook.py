@@ -48,7 +48,9 @@ what the sensors can tell (singular values, the weakest direction, what each sen
 their 2-sigma bands, innovations with their bounds, the mean NIS with the interval in which it is consistent,
 whiteness (Ljung-Box) and normality, NEES and RMSE where the log has columns `true.<state>`, how much of each state's
 variance comes from each noise, sensor and the start (linear covariance analysis), costs on a target, formats of fixed
-point. It has no script and fetches nothing; `--json` prints the same figures.
+point. It has no script and fetches nothing; `--json` prints the same figures. Of a quaternion all this is of its three
+errors. With `history`, estimates and NIS are those of the filter that takes late readings; innovations, whiteness and
+budget are of the readings put back to where they were made.
 
 `kfgen tune vehicle.yaml monday.csv tuesday.csv -o tuned.yaml` maximises the likelihood of the innovations, over all
 noises or over the numbers that `--free` names. Each becomes a parameter of one compiled filter, so that a trial costs
@@ -62,5 +64,6 @@ than two or three good measurements.
 
 `kfgen smooth vehicle.yaml drive.csv -o smoothed.csv` runs the fixed-interval smoother (Rauch-Tung-Striebel; of a ukf
 in its sigma-point form) in numpy. It never knows less than the filter, and equals least squares over the whole track
-where the model is linear. Refused, with the reason: `imm`, `ekf2`, `adapt_R`, `adapt_Q`.
+where the model is linear. Late readings are taken in where they were made.
+Refused, with the reason: `imm`, `ekf2`, `adapt_R`, `adapt_Q`.
 """.strip()

@@ -33,6 +33,7 @@ Schema = dict[str, Any]
 
 _NAME = rf"^[A-Za-z][A-Za-z0-9_]{{0,{MAX_NAME - 1}}}$"
 _EXPRESSION: Schema = {"type": ["number", "string"]}
+_ROW: Schema = {"type": "array", "items": _EXPRESSION}
 
 
 def json_schema() -> Schema:
@@ -68,6 +69,8 @@ class _Writer:
                 return {"enum": list(values)}
             case Flag(off):
                 return {"enum": [True, False, off]} if off else {"type": "boolean"}
+            case Formula(shaped=True):
+                return {"anyOf": [_EXPRESSION, {"type": "array", "items": {"anyOf": [_EXPRESSION, _ROW]}}]}
             case Formula():
                 return dict(_EXPRESSION)
             case Whole(low, high):

@@ -43,3 +43,20 @@ def readings_of(spec: Spec) -> list[tuple[Sensor, slice]]:
         found.append((sensor, slice(first, last)))
         first = last
     return found
+
+
+def in_use(sensor: Sensor, bits: int) -> tuple[int, ...]:
+    """The components (indices) of which a reading counts where those in a mask are there: a quaternion counts whole, or
+    not at all."""
+    there = {component.name for i, component in enumerate(sensor.components) if bits >> i & 1}
+    for rotation in sensor.rotations:
+        if not there.issuperset(rotation.parts):
+            there -= set(rotation.parts)
+    return tuple(i for i, component in enumerate(sensor.components) if component.name in there)
+
+
+def degrees_of(sensor: Sensor, bits: int) -> int:
+    """The degrees of freedom of a reading of the components in a mask."""
+    used = in_use(sensor, bits)
+    names = {sensor.components[i].name for i in used}
+    return len(used) - sum(names.issuperset(rotation.parts) for rotation in sensor.rotations)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from difflib import get_close_matches
 from fractions import Fraction
@@ -14,10 +14,11 @@ from kfgen.spec.constants import environment_of, value
 from kfgen.spec.expressions import parse
 from kfgen.spec.lexer import ExpressionError, tokenize
 from kfgen.spec.tree import Expression, Tree, names
-from kfgen.spec.types import Range, Spec
+from kfgen.spec.types import Constant, Parameter, Range, Spec
 
-_NOISE = re.compile(r"(\.(std|var|density|root_density)$)|(\bQ\b)|(\bR\b)|(noise_covariance)")
+_NOISE = re.compile(r"(\.(std|var|density|root_density)(\[\d+\])*$)|(\bQ\b)|(\bR\b)|(noise_covariance)")
 START = re.compile(r"(^|\.)(states|covariances|P0)\b")
+_FIRST = re.compile(r"^initialize\b.*\.var\b")
 _OFF_DIAGONAL = re.compile(r"\[(\d+)\]\[(\d+)\]$")
 _DIGITS = 6  # of a number that is written
 
@@ -64,7 +65,25 @@ def expressions(part: object) -> Iterator[Expression]:
 def plain_path(path: str) -> str:
     """A path as people write it: `Q[0][1]`, and a parameter's `value` left out."""
     path = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", path)
-    return path.removesuffix(".value")
+    return re.sub(r"\.value(?=$|\[)", "", path)
+
+
+def names_at(spec: Spec, place: Place) -> tuple[str, ...]:
+    """The parameters or constants whose value stands at a place: of a vector perhaps several."""
+    entries: tuple[Parameter | Constant, ...] = (*spec.parameters, *spec.constants)
+    return tuple(each.name for each in entries if each.value.place == place)
+
+
+def _of_part(spec: Spec, path: str) -> str:
+    """The path of a part of a vector that is asked for by its name, `parameters.field.x` or `.field_x`."""
+    top, _, rest = path.partition(".")
+    if top not in ("parameters", "constants"):
+        return path
+    entries: Sequence[Parameter | Constant] = spec.parameters if top == "parameters" else spec.constants
+    for each in entries:
+        if each.name == rest.replace(".", "_") and len(names_at(spec, each.value.place)) == 1:
+            return plain_path(each.value.place.path)
+    return path
 
 
 def written(spec: Spec) -> dict[str, Expression]:
@@ -78,7 +97,7 @@ def written(spec: Spec) -> dict[str, Expression]:
 def slot_of(spec: Spec, asked: str, known: Mapping[str, Expression] | None = None) -> Slot:
     """The number at a path, or at the only path that ends so. KfgenError says why there is none."""
     known = written(spec) if known is None else known
-    path = plain_path(asked)
+    path = _of_part(spec, plain_path(asked))
     if path not in known:
         ending = [each for each in known if each.endswith(f".{path}")]
         if len(ending) != 1:
@@ -88,10 +107,12 @@ def slot_of(spec: Spec, asked: str, known: Mapping[str, Expression] | None = Non
     top = path.partition(".")[0]
     if top in ("dt", "fixed", "code", "imm") and not path.startswith("imm.modes."):
         raise KfgenError(f"{asked} cannot be tuned: code is generated for the number itself")
-    literal = None if top in ("parameters", "constants") else _literal(asked, expression)
+    literal = _literal(asked, expression)
+    if top in ("parameters", "constants"):
+        literal = None  # it is known by its name
     number = _number(spec, expression, literal)
-    noise, crossed = _is_noise(spec, path) and not _off_diagonal(path), _off_diagonal(path)
-    limits = _range(spec, path)
+    crossed = _off_diagonal(path)
+    noise, limits = _is_noise(spec, path, expression) and not crossed, _range(spec, expression)
     positive = number > 0 and not crossed and (noise or _sized(path) or limits[0] >= 0)
     if noise and number < 0:
         raise KfgenError(f"{asked} is {number:g}: a noise cannot be negative")
@@ -106,7 +127,7 @@ def default_slots(spec: Spec) -> list[Slot]:
     """All noises whose sizes stand in the spec as numbers, not those of the start."""
     known, found = written(spec), []
     for path in known:
-        if not (_is_noise(spec, path) and not START.search(path) and not _off_diagonal(path)):
+        if not (_is_noise(spec, path, known[path]) and not START.search(path) and not _off_diagonal(path)):
             continue
         try:
             slot = slot_of(spec, path, known)
@@ -155,7 +176,7 @@ def _number(spec: Spec, expression: Expression, literal: int | None) -> float:
 
 
 def _sized(path: str) -> bool:
-    return bool(_NOISE.search(path))
+    return bool(_NOISE.search(path) or _FIRST.search(path))
 
 
 def _off_diagonal(path: str) -> bool:
@@ -163,13 +184,18 @@ def _off_diagonal(path: str) -> bool:
     return match is not None and match.group(1) != match.group(2)
 
 
-def _is_noise(spec: Spec, path: str) -> bool:
+def _is_noise(spec: Spec, path: str, expression: Expression) -> bool:
     """Whether the number is the size of a noise: by its key, or, for a name, by where alone it is used."""
-    top, _, name = path.partition(".")
-    if top not in ("parameters", "constants"):
-        return _sized(path) and not START.search(path)
-    used = [plain_path(each.place.path) for each in expressions(spec) if name in _reach(spec, each.tree)]
-    return bool(used) and all(_sized(each) and not START.search(each) for each in used if each != path)
+    if path.partition(".")[0] not in ("parameters", "constants"):
+        return _runs(path)
+    named = set(names_at(spec, expression.place))
+    used = [plain_path(each.place.path) for each in expressions(spec) if named & _reach(spec, each.tree)]
+    return bool(used) and all(_runs(each) for each in used if each != path)
+
+
+def _runs(path: str) -> bool:
+    """Whether it is the size of what goes on, not of the start."""
+    return _sized(path) and not START.search(path) and not _FIRST.search(path)
 
 
 def _reach(spec: Spec, tree: Tree) -> set[str]:
@@ -185,8 +211,8 @@ def _reach(spec: Spec, tree: Tree) -> set[str]:
     return found
 
 
-def _range(spec: Spec, path: str) -> tuple[float, float]:
-    given: Range | None = next((p.range for p in spec.parameters if f"parameters.{p.name}" == path), None)
+def _range(spec: Spec, expression: Expression) -> tuple[float, float]:
+    given: Range | None = next((p.range for p in spec.parameters if p.value.place == expression.place), None)
     if given is None:
         return -math.inf, math.inf
     known = environment_of(spec)

@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from kfgen.apart import differences
 from kfgen.errors import KfgenError
-from kfgen.geometry import Part, part_of
 from kfgen.logs import Log
+from kfgen.native.first import firsts
 from kfgen.native.run import Plan, RunResult, fixed_step, follow, plan
 from kfgen.scalar_names import DOUBLE
-from kfgen.spec.constants import value
+from kfgen.spec.sensors import degrees_of
 from kfgen.spec.types import Sensor, Spec
 from kfgen.statistics import chi2_quantile
 from kfgen.status import ERROR, Status
@@ -48,28 +49,26 @@ class Score:
 
 @dataclass(frozen=True)
 class _Drive:
-    """A log as calls; fitted: rows [N] that are not held out. truth [N, n], NaN where there is none."""
+    """A log as calls; fitted: rows [N] that are not held out. truth [N, nx], NaN where there is none."""
 
     work: Plan
     fitted: NDArray[np.bool_]
-    used: NDArray[np.int64]  # components [N, sensors] in each update
+    used: NDArray[np.int64]  # degrees of freedom [N, sensors] of each update
     truth: Array
 
 
 class Objective:
     """Scores numbers over logs. Usable from several threads."""
 
-    def __init__(self, opened: Opened, logs: Sequence[Log], holdout: float, kind: str, robust: bool) -> None:
-        from kfgen.native import compile as compiled
-
+    def __init__(
+        self, opened: Opened, logs: Sequence[Log], holdout: float, kind: str, robust: bool, past: bool = False
+    ) -> None:
         self.opened, self.spec = opened, _bare(opened.spec)
         self.kind, self.robust = kind, robust
-        self.kf: NativeFilter = compiled(self.spec)
         self.drives = [_drive(self.spec, log, holdout) for log in logs]
+        self.kf = self._compiled(past or _late(self.drives))
         self.holdout = holdout
-        periods = [None if s.period is None else float(value(s.period.tree, self.spec)) for s in self.spec.states]
-        self.parts = [part_of(period) for period in periods]
-        widest = max(len(sensor.components) for sensor in self.spec.measurements)
+        widest = max(len(sensor.errors) for sensor in self.spec.measurements)
         self.limits = {m: chi2_quantile(OUTLIER, m) for m in range(1, 1 + widest)}
         self.pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
         self.trials = 0
@@ -78,7 +77,7 @@ class Objective:
 
     def scores(self, trials: Iterable[Sequence[float]]) -> list[Score]:
         """The scores of several trials, each a number per slot."""
-        wanted = [dict(zip(self.opened.names, map(float, trial), strict=True)) for trial in trials]
+        wanted = [self.opened.named(trial) for trial in trials]
         self.trials += len(wanted)
         jobs = [[self.pool.submit(self._one, numbers, drive) for drive in self.drives] for numbers in wanted]
         return [self._sum([job.result() for job in row]) for row in jobs]
@@ -88,6 +87,8 @@ class Objective:
         other = object.__new__(Objective)
         other.__dict__.update(self.__dict__)
         other.drives, other.trials = [_drive(self.spec, log, self.holdout) for log in logs], 0
+        if _late(other.drives) and not self.kf.struct.has_past:
+            other.kf = self._compiled(True)
         return other
 
     def decided(self, trial: Sequence[float]) -> Objective:
@@ -95,7 +96,7 @@ class Objective:
         else is let in. It is smooth, and there it is as high as this one but for what the rejected ones count."""
         if not any(sensor.gate is not None for sensor in self.spec.measurements):
             return self
-        numbers = dict(zip(self.opened.names, map(float, trial), strict=True))
+        numbers = self.opened.named(trial)
         drives = []
         for drive in self.drives:
             result = self._one(numbers, drive)[0]
@@ -105,10 +106,16 @@ class Objective:
             work = replace(drive.work, mask=np.where(gated, 0, drive.work.mask).astype(np.uint32))
             drives.append(replace(drive, work=work, used=np.where(gated, 0, drive.used)))
         other = Objective(
-            replace(self.opened, spec=_ungated(self.opened.spec)), [], self.holdout, "likelihood", self.robust
-        )
+            replace(self.opened, spec=_ungated(self.opened.spec)), [], self.holdout, "likelihood", self.robust,
+            self.kf.struct.has_past,
+        )  # fmt: skip
         other.drives = drives
         return other
+
+    def _compiled(self, past: bool) -> NativeFilter:
+        from kfgen.native import compile as compiled
+
+        return compiled(self.spec, history=past)
 
     def value(self, score: Score) -> float:
         """What is to become as large as it can."""
@@ -132,7 +139,7 @@ class Objective:
         return model.x0, model.P0
 
     def _sum(self, runs: Sequence[tuple[RunResult, _Drive]]) -> Score:
-        likelihood, squares = [0.0, 0.0], np.zeros((len(self.parts), 2))
+        likelihood, squares = [0.0, 0.0], np.zeros((len(self.spec.errors), 2))
         nis: dict[str, list[float]] = {s.name: [0.0, 0.0, 0.0, 0.0] for s in self.spec.measurements}
         for result, drive in runs:
             likelihood[0] += FAILED * int(np.count_nonzero(result.calls["predict"] >= ERROR))
@@ -143,10 +150,10 @@ class Objective:
                     likelihood[k] += float(terms[rows].sum())
                     nis[sensor.name][k] += float(result.nis[sensor.name][rows & some].sum())
                     nis[sensor.name][k + 2] += float(drive.used[rows & some, i].sum())
-            for i, part in enumerate(self.parts):
-                there = np.flatnonzero(drive.fitted & np.isfinite(drive.truth[:, i]))
-                apart = differences(part, result.x[there, i], drive.truth[there, i])
-                squares[i] += float(apart @ apart), len(there)
+            if self.kind == "rmse":
+                apart = differences(self.spec, result.x[drive.fitted], drive.truth[drive.fitted])
+                there = ~np.isnan(differences(self.spec, drive.truth[drive.fitted], drive.truth[drive.fitted]))
+                squares += np.column_stack([np.where(there, apart**2, 0.0).sum(axis=0), there.sum(axis=0)])
         means = {name: (_ratio(a[0], a[2]), _ratio(a[1], a[3])) for name, a in nis.items()}
         known = squares[squares[:, 1] > 0]
         error = float(np.sum(0.5 * known[:, 1] * np.log(np.maximum(known[:, 0] / known[:, 1], 1e-300))))
@@ -165,7 +172,9 @@ class Objective:
         name = self.spec.measurements[i].name
         assert result.log_likelihood is not None
         nis, m, ll = result.nis[name], drive.used[:, i], result.log_likelihood[name]
-        called, taken = m > 0, np.isfinite(ll)
+        called = m > 0
+        taken = called & np.isfinite(ll)
+        called &= result.calls[f"update_{name}"] & Status.TOO_OLD == 0  # it is that whatever the numbers are
         failed = called & ~np.isfinite(nis)
         terms = np.where(taken, ll, 0.0)
         terms[failed] = FAILED
@@ -188,11 +197,8 @@ class Objective:
         return terms
 
 
-def differences(part: Part, a: Array, b: Array) -> Array:
-    """a [-] b [N] of one state."""
-    if part.flat:
-        return a - b
-    return np.array([part.local(x, y) for x, y in zip(a.tolist(), b.tolist(), strict=True)])
+def _late(drives: Sequence[_Drive]) -> bool:
+    return any(drive.work.age.any() for drive in drives)
 
 
 def _ratio(total: float, number: float) -> float:
@@ -220,7 +226,14 @@ def _ungated(spec: Spec) -> Spec:
 def _drive(spec: Spec, log: Log, holdout: float) -> _Drive:
     work = plan(spec, log, fixed_step(spec))
     fitted = np.arange(log.rows) < round((1.0 - holdout) * log.rows)
-    used = np.array([[int(bits).bit_count() for bits in row] for row in work.mask.tolist()], dtype=np.int64)
+    used = np.array([
+        [degrees_of(sensor, bits) for sensor, bits in zip(spec.measurements, row, strict=True)]
+        for row in work.mask.tolist()
+    ], dtype=np.int64).reshape(log.rows, len(spec.measurements))  # fmt: skip
+    row, sensor = np.nonzero(work.mask)
+    bits = work.mask[row, sensor]
+    setting, waiting = firsts(spec, sensor, bits, np.ones(len(row), bool))
+    used[row[setting | waiting], sensor[setting | waiting]] = 0
     absent = np.full(log.rows, np.nan)
     truth = np.column_stack([log.columns.get(f"true.{state.name}", absent) for state in spec.states])
-    return _Drive(work, fitted, used.reshape(log.rows, len(spec.measurements)), truth)
+    return _Drive(work, fitted, used, truth)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -12,34 +12,42 @@ from kfgen.spec.expressions import parse
 from kfgen.spec.lexer import tokenize
 from kfgen.spec.tree import Call, Expression, Name, Number, Tree, names
 from kfgen.spec.types import Parameter, Spec
-from kfgen.tuning.numbers import START, Slot, expressions, plain_path
+from kfgen.tuning.numbers import START, Slot, expressions, names_at, plain_path
 
 
 @dataclass(frozen=True)
 class Opened:
-    """A spec whose slots are run-time parameters: names, one a slot; start: whether x0 or P0 depend on them."""
+    """A spec whose slots are run-time parameters: names, of each slot, several where one number stands for a vector;
+    start: whether x0 or P0 depend on them."""
 
     spec: Spec
-    names: tuple[str, ...]
+    names: tuple[tuple[str, ...], ...]
     start: bool
+
+    def named(self, numbers: Sequence[float]) -> dict[str, float]:
+        """The parameters of a number per slot."""
+        pairs = zip(self.names, numbers, strict=True)
+        return {name: float(number) for names, number in pairs for name in names}
 
 
 def opened(spec: Spec, slots: list[Slot]) -> Opened:
     """Each slot becomes a parameter: one compilation serves all values of them. KfgenError where one cannot."""
     taken = {name for each in expressions(spec) for name in names(each.tree)} | {p.name for p in spec.parameters}
-    hidden: list[str] = []
-    by_place: dict[tuple[int, int], tuple[str, int | None]] = {}
+    hidden: list[tuple[str, ...]] = []
+    by_place: dict[tuple[int, int], tuple[str, Slot, int | None]] = {}
     moved: dict[str, Tree] = {}  # constants that are none any more, and what they are
     for i, slot in enumerate(slots):
-        top, _, rest = plain_path(slot.place.path).partition(".")
-        name = rest if top == "parameters" else f"tuned_{i + 1}"
-        while top != "parameters" and name in taken:
+        top, named = plain_path(slot.place.path).partition(".")[0], names_at(spec, slot.place)
+        if top == "parameters":
+            hidden.append(named)
+            continue
+        name = f"tuned_{i + 1}"
+        while name in taken:
             name += "_"
-        hidden.append(name)
-        if top == "constants":
-            moved[rest] = Name(name)
-        elif top != "parameters":
-            by_place |= {(place.line, place.column): (name, literal) for place, literal in slot.spots}
+        hidden.append((name,))
+        moved |= {each: Name(name) for each in named}
+        if top != "constants":
+            by_place |= {(place.line, place.column): (name, slot, literal) for place, literal in slot.spots}
     kept = []
     for constant in spec.constants:
         if constant.name in moved:
@@ -54,27 +62,32 @@ def opened(spec: Spec, slots: list[Slot]) -> Opened:
         tree = substituted(expression.tree, moved)
         found = by_place.get((expression.place.line, expression.place.column))
         if found is not None:
-            name, literal = found
+            name, slot, literal = found
             raw = parse(expression.text)
             put: Tree = Name(name) if literal is None else _put(expression.text, raw, literal, name)
-            tree = _exchanged(tree, substituted(raw, moved), substituted(put, moved))
+            changed = _exchanged(tree, substituted(raw, moved), substituted(put, moved))
+            if changed == tree:
+                raise KfgenError(
+                    f"{slot.path}: `{expression.text}` is made of vectors; name the number that is meant, in parameters"
+                )
+            tree = changed
         return expression if tree == expression.tree else replace(expression, tree=tree)
 
     changed: Spec = _mapped(replace(spec, constants=tuple(kept)), change)
-    values = {name: slot.value for name, slot in zip(hidden, slots, strict=True)}
+    values = {name: slot.value for names, slot in zip(hidden, slots, strict=True) for name in names}
     for before, after in zip(spec.parameters, changed.parameters, strict=True):
         if before.value.tree != after.value.tree:
             raise KfgenError(f"parameters.{before.name} is computed from a number that is to be tuned: tune it instead")
     own = [p for p in changed.parameters if p.name not in values]
     new = [p for p in changed.parameters if p.name in values]
-    new += [_parameter(name) for name in hidden if name not in {p.name for p in changed.parameters}]
+    new += [_parameter(name) for name in values if name not in {p.name for p in changed.parameters}]
     new = [replace(p, value=_exactly(values[p.name], p.value.place)) for p in new]
     changed = replace(changed, parameters=(*own, *new))
     lets = {d.name: d.value.tree for d in changed.let}
     first = [*expressions(changed.states), *expressions(changed.covariances), *expressions(changed.P0 or ())]
     first = [each for each in first if START.search(each.place.path)]
     used = {name for each in first for name in names(substituted(each.tree, lets))}
-    return Opened(changed, tuple(hidden), bool(used & set(hidden)))
+    return Opened(changed, tuple(hidden), bool(used & values.keys()))
 
 
 def with_values(opened: Opened, values: Mapping[str, float]) -> Spec:

@@ -81,6 +81,26 @@ def test_another_state_is_another_interface(diff):
     assert "name: cart is trolley now" in diff("old.yaml", "wider.yaml", "--no-cost").output
 
 
+ATTITUDE = """kfgen: 1
+name: attitude
+dt: 0.1
+states: {q: {kind: quaternion, init: [1, 0, 0, 0], std: 0.1}, b: {vector: 2, init: 0, std: 1}}
+dynamics: {form: discrete, Q: {q: 1e-4, b: 0.01}}
+measurements: {star: {z: {q: {h: q, std: 0.05}, b: {h: b, std: 0.3}}}}
+filter: {type: ekf}
+"""
+
+
+def test_rotations_differ_by_their_errors(diff):
+    Path("a.yaml").write_text(ATTITUDE)
+    # the same rotation, and another noise of b alone
+    Path("b.yaml").write_text(ATTITUDE.replace("[1, 0, 0, 0]", "[-1, 0, 0, 0]").replace("b: 0.01", "b: 0.02"))
+    found = plain(diff("a.yaml", "b.yaml", "--json", "--no-cost"))["behaviour"]["states"]
+    assert list(found) == ["q_rx", "q_ry", "q_rz", "b_x", "b_y"]
+    assert all(found[name]["x"] < 1e-6 and found[name]["variance"] < 1e-6 for name in ("q_rx", "q_ry", "q_rz"))
+    assert found["b_x"]["sigma"] > 0.1
+
+
 def test_costs_are_told_side_by_side(diff, needs):
     needs("arm-none-eabi-gcc")
     found = plain(diff("old.yaml", "wider.yaml", "--json"))["cost"]

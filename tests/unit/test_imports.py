@@ -33,6 +33,7 @@ ALLOWED = {
     "override": SPEC,
     "excursions": {"errors", "spec"},
     "cells": {"errors"},
+    "apart": SPEC,
     "columns": SPEC,
     "logs": SPEC | {"cells", "columns", "files"},
     "late": SPEC | {"logs"},
@@ -54,10 +55,10 @@ ALLOWED = {
     "native": SPEC | {"emit", "files", "generate", "late", "logs", "override", "status"},
     "smoothing": SPEC | {"logs", "native", "reference"},
     "statistics": set(),
-    "tuning": SPEC | {"geometry", "logs", "native", "reference", "statistics", "status"},
+    "tuning": SPEC | {"apart", "logs", "native", "reference", "statistics", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "report": SPEC
-    | {"cost", "generate", "geometry", "logs", "model", "native", "plot", "reference", "simulate", "smoothing"}
+    | {"apart", "cost", "generate", "logs", "model", "native", "plot", "reference", "simulate", "smoothing"}
     | {"statistics", "status"},
     "check": SPEC
     | {"advice", "excursions", "generate", "geometry", "interface", "native", "override", "reference", "simulate"}
@@ -67,7 +68,7 @@ ALLOWED = {
     | {"emit", "filters", "fixed", "generate", "geometry", "ir", "logs", "native", "reference", "scalars", "simulate"}
     | {"status"},
     "layouts": {"emit"},
-    "difference": SPEC | {"generate", "geometry", "logs", "native"},
+    "difference": SPEC | {"apart", "generate", "logs", "native"},
     "tools": {"__init__", "errors", "native"},
     "commands": SPEC
     | {"advice", "check", "columns", "cost", "difference", "examples", "excursions", "files", "generate", "late"}

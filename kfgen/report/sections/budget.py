@@ -35,10 +35,10 @@ def section(subject: Subject) -> Section | None:
 
 
 def shares(subject: Subject, drive: Drive) -> dict[str, dict[str, float]]:
-    """State -> source -> share of its variance; causes without a share are left out."""
+    """Error -> source -> share of its variance; causes without a share are left out."""
     walk, out = drive.walk, {}
     variances = np.einsum("sii->si", walk.parts)
-    for i, state in enumerate(subject.states):
+    for i, state in enumerate(subject.names):
         total = float(variances[:, i].sum())
         if total <= 0.0:  # known exactly from the start on
             out[state] = {"start": 1.0}
@@ -48,19 +48,19 @@ def shares(subject: Subject, drive: Drive) -> dict[str, dict[str, float]]:
 
 
 def _sigma(subject: Subject, drive: Drive) -> dict[str, float]:
-    """State -> its standard deviation at the end."""
+    """Error -> its standard deviation at the end."""
     variances = np.maximum(np.einsum("sii->i", drive.walk.parts), 0.0)
-    return {name: float(variance**0.5) for name, variance in zip(subject.states, variances, strict=True)}
+    return {name: float(variance**0.5) for name, variance in zip(subject.names, variances, strict=True)}
 
 
 def _grid(subject: Subject, drive: Drive, found: dict[str, dict[str, float]]) -> Grid:
     used = [name for name in drive.walk.sources if any(each.get(name, 0.0) >= 5e-4 for each in found.values())]
     rows, bars = [], {}
     sigmas = _sigma(subject, drive)
-    for r, state in enumerate(subject.spec.states):
-        row = [state.name, f"{figure(sigmas[state.name], 3)} {state.unit}".strip()]
+    for r, (state, unit) in enumerate(zip(subject.names, subject.units, strict=True)):
+        row = [state, f"{figure(sigmas[state], 3)} {unit}".strip()]
         for c, name in enumerate(used):
-            share = found[state.name].get(name, 0.0)
+            share = found[state].get(name, 0.0)
             row.append(percent(share) if share >= 5e-4 else "")
             bars[r, c + 2] = share
         rows.append(row)

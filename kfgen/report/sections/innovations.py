@@ -128,13 +128,14 @@ def _pictures(subject: Subject, drive: Drive, i: int, key: str) -> list[Picture]
     sensor = subject.spec.measurements[i]
     out = [_nis(subject, drive, i, f"nis{key}")]
     seen = drive.walk.innovations[sensor.name]
-    for k, component in enumerate(sensor.components[:MOST]):
+    units = {component.name: component.unit for component in sensor.components}
+    for k, name in enumerate(sensor.errors[:MOST]):
         if np.isfinite(seen.y[:, k]).any():
             out.append(
-                _innovation(subject, drive, i, k, f"{sensor.name}.{component.name}", component.unit, f"y{key}-{k}")
+                _innovation(subject, drive, i, k, f"{sensor.name}.{name}", units.get(name, "rad"), f"y{key}-{k}")
             )
     if statistics.lags_of(int(seen.taken.sum())) > 0:
-        out.append(_autocorrelation(drive, sensor.name, [c.name for c in sensor.components], f"acf{key}"))
+        out.append(_autocorrelation(drive, sensor.name, list(sensor.errors), f"acf{key}"))
     return out
 
 
@@ -145,12 +146,12 @@ def _axis(subject: Subject) -> str:
 def _nis(subject: Subject, drive: Drive, i: int, key: str) -> Picture:
     if subject.spec.imm is None:
         calls = np.flatnonzero(subject.degrees(drive, i) > 0)
-        row = drive.trace.row[calls]
+        t = drive.trace.work.t[drive.trace.row[calls]]
     else:
-        row = drive.walk.innovations[subject.spec.measurements[i].name].row
+        t = drive.walk.innovations[subject.spec.measurements[i].name].t
     q, m = nis(subject, drive, i)
     keep = np.isfinite(q) & (m > 0)
-    t, q, m = drive.trace.work.t[row[keep]], q[keep], m[keep]
+    t, q, m = t[keep], q[keep], m[keep]
     low, high = statistics.limits(np.array([float(m.max(initial=1))]))
     outside = float(np.mean((q < low) | (q > high))) if q.size else math.nan
 
@@ -173,7 +174,7 @@ def _innovation(subject: Subject, drive: Drive, i: int, k: int, name: str, unit:
     seen = drive.walk.innovations[subject.spec.measurements[i].name]
     there = np.flatnonzero(np.isfinite(seen.y[:, k]))
     there = there[:: max(1, -(-len(there) // 500))]
-    t, y, s, taken = drive.trace.work.t[seen.row[there]], seen.y[there, k], seen.sigma[there, k], seen.taken[there]
+    t, y, s, taken = seen.t[there], seen.y[there, k], seen.sigma[there, k], seen.taken[there]
 
     def draw(axes: Any) -> None:
         axes.fill_between(t, -2 * s, 2 * s, color=FAINT, alpha=0.3, linewidth=0, label="2 σ claimed")

@@ -39,6 +39,10 @@ def section(subject: Subject) -> Section:
         ):
             continue
         blocks += _sensing(mode, title)
+    if spec.initialize:
+        blocks.append(Grid("First measurements", ("of", "sets", "to"), list(dict.fromkeys(_firsts(spec)))))
+    if spec.outputs:
+        blocks.append(Equations("Outputs", [equation(name(each.name), each.value) for each in spec.outputs]))
     return Section("Model", blocks, {"model": _data(spec)})
 
 
@@ -67,8 +71,24 @@ def _states(spec: Spec) -> Grid:
         std = "" if deviation is None else figure(deviation)
         rows.append((state.name, state.unit, "" if state.kind == "real" else state.kind, _number(spec, state.init), std,
                      _range(spec, state.range), state.doc))  # fmt: skip
+    for rotation in spec.rotations:
+        for error, expression in zip(rotation.errors, rotation.variances, strict=True):
+            variance = _value(spec, expression)
+            std = "" if variance is None else figure(variance**0.5)
+            doc = f"error of {rotation.name}, as the {rotation.error} sees it"
+            rows.append((error, "rad", "rotation", "0", std, "", doc))
     head = ("state", "unit", "kind", "starts at", "± 1 σ", "range", "meaning")
-    return Grid(f"States ({len(rows)})", head, rows, right=(3, 4))
+    count = f"{len(spec.states)}" + (f", with {len(spec.errors)} errors" if spec.rotations else "")
+    return Grid(f"States ({count})", head, rows, right=(3, 4))
+
+
+def _firsts(spec: Spec) -> Iterator[tuple[str, str, str]]:
+    """Sensor, what it sets, and to what: of a vector as it is written."""
+    for rule in spec.initialize:
+        for what, given in (("", rule.states), ("var ", rule.variance)):
+            for each, formula in given.items():
+                written = formula.place.path.rpartition(".")[2] or each
+                yield rule.sensor, what + written, plain(formula.text)
 
 
 def _value(spec: Spec, expression: Expression | None) -> float | None:
@@ -103,13 +123,15 @@ def _motion(mode: Spec, title: str) -> Iterator[Block]:
     continuous, f = mode.dynamics.form == "continuous", mode.dynamics.f
     later = "<mrow><mi>k</mi><mo>+</mo><mn>1</mn></mrow>"
     rows = []
-    for state in mode.states:
-        if state.name in f:
-            left = name(state.name, later)
-            if continuous:
-                left = f"<mfrac><mrow><mi>d</mi>{name(state.name)}</mrow><mrow><mi>d</mi><mi>t</mi></mrow></mfrac>"
-            rows.append(equation(left, f[state.name]))
-    still = [state.name for state in mode.states if state.name not in f]
+    names = [state.name for state in mode.states]
+    turning = {part for rotation in mode.rotations if f.keys() & set(rotation.errors) for part in rotation.parts}
+    for each in [*names, *(error for error in mode.errors if error not in names)]:
+        if each in f:
+            left = name(each, later)
+            if continuous:  # of a rotation's error: the body's angular rate
+                left = f"<mfrac><mrow><mi>d</mi>{name(each)}</mrow><mrow><mi>d</mi><mi>t</mi></mrow></mfrac>"
+            rows.append(equation(left, f[each]))
+    still = [each for each in names if each not in f and each not in turning]
     how = f"continuous, {mode.dynamics.integrator}" if continuous else "discrete"
     kept = f"; constant: {', '.join(still)}" if still else ""
     if rows:
@@ -121,8 +143,8 @@ def _motion(mode: Spec, title: str) -> Iterator[Block]:
             (f"Q.{each}", "added to the state", "variance per step", plain(entry.text)) for each, entry in Q.items()
         ]
     else:
-        noises += [(f"Q.{state.name}", "full matrix, row", "variance per step", ", ".join(plain(e.text) for e in row))
-                   for state, row in zip(mode.states, Q, strict=True)]  # fmt: skip
+        noises += [(f"Q.{error}", "full matrix, row", "variance per step", ", ".join(plain(e.text) for e in row))
+                   for error, row in zip(mode.errors, Q, strict=True)]  # fmt: skip
     if noises:
         yield Grid(f"Process noise{of}", ("noise", "where", "what", "as written"), noises)
 
@@ -155,11 +177,18 @@ def _components(sensors: Sequence[Sensor]) -> Iterator[tuple[str, str, str, str,
             chosen = sensor.gate.probability or sensor.gate.threshold
             kind = "probability" if sensor.gate.probability is not None else "threshold"
             gate = f"{kind} {plain(chosen.text)}" if chosen is not None else ""
+        of_rotations = {part: variance for rotation in sensor.rotations
+                        for part, variance in zip(rotation.parts[1:], rotation.variances, strict=True)}  # fmt: skip
         for component in sensor.components:
-            given = component.variance
+            given = component.variance or of_rotations.get(component.name)
+            if component.name in {rotation.parts[0] for rotation in sensor.rotations}:
+                yield f"{sensor.name}.{component.name}", "(quaternion)", "", "", gate
+                continue
             key = "R" if given is None else given.place.path.rpartition(".")[2]
             text = "" if given is None else plain(given.text)
             unit = component.unit + (f" ({component.kind})" if component.kind != "real" else "")
             yield f"{sensor.name}.{component.name}", unit, key, text, gate
+        for known in sensor.inputs:
+            yield f"{sensor.name}: {known.name}", known.unit, "given with it", "", ""
         for noise in _noises(sensor.noise):
             yield f"{sensor.name}: {noise[0]}", "", noise[2], noise[3], ""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kfgen.plot import measured_as
+from kfgen.plot import beside, measured_as
 from kfgen.report.blocks import Block, Grid, Note, Picture, Section, figure
 from kfgen.report.figures import BAD, BAND, ESTIMATE, MEASURED, MODES, SMOOTH, TRUTH, few, picture, thin
 from kfgen.report.subject import Drive, Subject
@@ -42,8 +42,10 @@ def section(subject: Subject) -> Section | None:
             "log": drive.title, "rows": len(t), "rows_linearised": drive.walk.rows,
             "flags": [{"function": f, "flag": flag, "kind": kind, "times": n} for f, flag, kind, n in counts],
             "end": {
-                name: {"estimate": float(x), "sigma": float(s)}
-                for name, x, s in zip(subject.states, drive.x[-1], drive.sigma[-1], strict=True)
+                **{name: {"estimate": float(x)} for name, x in zip(subject.states, drive.x[-1], strict=True)},
+                **{name: {"estimate": float(drive.x[-1, subject.states.index(name)]), "sigma": float(s)}
+                   if name in subject.states else {"sigma": float(s)}
+                   for name, s in zip(subject.names, drive.sigma[-1], strict=True)},
             },
         })  # fmt: skip
     return Section("Run", blocks, {"logs": logs})
@@ -68,8 +70,9 @@ def _axis(subject: Subject) -> str:
 
 def _state(subject: Subject, drive: Drive, i: int, key: str) -> Picture:
     state, period = subject.spec.states[i], subject.periods[i]
-    t, x, sigma = drive.trace.work.t, drive.x[:, i], drive.sigma[:, i]
-    truth = drive.log.columns.get(f"true.{state.name}")
+    t, x, spread = drive.trace.work.t, drive.x[:, i], subject.sigma(drive, i)
+    sigma = np.zeros(len(t)) if spread is None else spread
+    truth = beside(subject.spec, drive.log, drive.x, state.name, f"true.{state.name}")
     smooth = None if drive.smoothed is None else drive.smoothed[:, i]
     lines = [x, sigma, np.full(len(t), np.nan) if truth is None else truth, x if smooth is None else smooth]
     points = max(120, min(500, 9000 // len(subject.states)))
@@ -81,11 +84,13 @@ def _state(subject: Subject, drive: Drive, i: int, key: str) -> Picture:
         return np.where(np.abs(np.diff(values, prepend=values[:1])) > period / 2, np.nan, values)
 
     def draw(axes: Any) -> None:
-        axes.fill_between(ts, xs - 2 * ss, xs + 2 * ss, color=BAND, alpha=0.35, linewidth=0, label="2 σ")
+        if spread is not None:
+            axes.fill_between(ts, xs - 2 * ss, xs + 2 * ss, color=BAND, alpha=0.35, linewidth=0, label="2 σ")
         for column in measured_as(subject.spec, state.name):
-            if column in drive.log.columns:
+            seen = beside(subject.spec, drive.log, drive.x, state.name, column)
+            if seen is not None:
                 axes.plot(
-                    *few(t, drive.log.columns[column], points),
+                    *few(t, seen, points),
                     ".",
                     color=MEASURED,
                     markersize=2,
@@ -102,10 +107,10 @@ def _state(subject: Subject, drive: Drive, i: int, key: str) -> Picture:
         axes.set_xlabel(_axis(subject))
         axes.set_ylabel(state.name + (f" [{state.unit}]" if state.unit else ""))
 
-    said = f"{state.name} over time: from {figure(float(x[0]))} to {figure(float(x[-1]))} {state.unit}, "
-    return picture(
-        draw, f"{state.name}, {drive.title}", f"{said}standard deviation at the end {figure(float(sigma[-1]))}", key
-    )
+    said = f"{state.name} over time: from {figure(float(x[0]))} to {figure(float(x[-1]))} {state.unit}"
+    if spread is not None:
+        said += f", standard deviation at the end {figure(float(sigma[-1]))}"
+    return picture(draw, f"{state.name}, {drive.title}", said, key)
 
 
 def _focus(x: np.ndarray, sigma: np.ndarray, truth: np.ndarray | None) -> tuple[float, float]:

@@ -12,9 +12,9 @@ ORDER = 20
 
 
 def section(subject: Subject) -> Section:
-    code, states = subject.generated.code, subject.states
+    code, states = subject.generated.code, list(subject.names)
     blocks: list[Block] = [Note(f"{code.description}, {subject.spec.scalar}.")]
-    order = [code.model.states[i] for i in code.order]
+    order = [code.model.errors[i] for i in code.order]
     if order != states:
         blocks.append(Note(f"Inside, the states stand in the order {', '.join(order)}."))
     data: dict[str, object] = {"structure": {"filter": code.description, "order": order}}
@@ -25,7 +25,7 @@ def section(subject: Subject) -> Section:
     blocks.append(Pattern("F: the state after a step depends on", states, states, walk.F_used.tolist()))
     if walk.Q_used.any():
         blocks.append(Pattern("Noise of a step: correlated", states, states, walk.Q_used.tolist()))
-    rows = [f"{s.name}.{c.name}" for s in subject.spec.measurements for c in s.components]
+    rows = [f"{s.name}.{name}" for s in subject.spec.measurements for name in s.errors]
     blocks.append(Pattern("H: a measurement depends on", rows, states, np.vstack(list(walk.H_used.values())).tolist()))
     found, without = _seen(subject, first)
     blocks += _told(subject, first, found, without)
@@ -35,7 +35,7 @@ def section(subject: Subject) -> Section:
 
 def _seen(subject: Subject, drive: Drive) -> tuple[Observability, dict[str, Observability]]:
     sigma = np.sqrt(np.maximum(np.diag(drive.trace.P[0]), 0.0))
-    H, names = drive.walk.H, subject.states
+    H, names = drive.walk.H, subject.names
     whole = observability(list(H.values()), sigma, names)
     parts = {}
     if len(H) > 1:
@@ -44,7 +44,7 @@ def _seen(subject: Subject, drive: Drive) -> tuple[Observability, dict[str, Obse
 
 
 def _told(subject: Subject, drive: Drive, found: Observability, without: dict[str, Observability]) -> list[Block]:
-    n = len(subject.states)
+    n = len(subject.names)
     rest = "all are seen" if found.rank == n else f"{n - found.rank} of their combinations are not seen"
     blocks: list[Block] = [
         Note(

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from kfgen import statistics
 from kfgen.report.blocks import Block, Grid, Note, Picture, Section, figure, percent
-from kfgen.report.figures import BAD, ESTIMATE, few, picture
+from kfgen.report.figures import BAD, BAND, ESTIMATE, few, picture, thin
 from kfgen.report.subject import Drive, Subject
 
 Array = NDArray[np.float64]
 
 ORDER = 40
+MOST = 48  # errors of rotations that are drawn: the numbers of a quaternion have no standard deviation
 ROUND_OFF = 1e-12  # of the largest eigenvalue of the correlations: below it an estimate claims to know exactly
 
 
@@ -38,14 +39,14 @@ def section(subject: Subject) -> Section | None:
         )
         blocks.append(Note(text, "good" if size.verdict == "consistent" else "bad"))
     rows = []
-    for state in subject.spec.states:
-        if state.name in rmse:
-            each = rmse[state.name]
+    for name, unit in zip(subject.names, subject.units, strict=True):
+        if name in rmse:
+            each = rmse[name]
             ratio = each["rmse"] / each["sigma"] if each["sigma"] > 0 else None
             rows.append(
                 (
-                    state.name,
-                    state.unit,
+                    name,
+                    unit,
                     figure(each["rmse"]),
                     figure(each["sigma"]),
                     figure(ratio, 3),
@@ -60,8 +61,12 @@ def section(subject: Subject) -> Section | None:
             right=(2, 3, 4, 5),
         )
     )
-    for (n, drive, _), q, m in zip(known, squares, degrees, strict=True):
+    turning = {error for rotation in subject.spec.rotations for error in rotation.errors}
+    for (n, drive, errors), q, m in zip(known, squares, degrees, strict=True):
         blocks.append(_picture(subject, drive, q, m, f"nees{n}"))
+        for i, name in enumerate(subject.names[:MOST]):
+            if name in turning and np.isfinite(errors[:, i]).any():
+                blocks.append(_error(subject, drive, errors[:, i], i, f"e{n}-{i}"))
     return Section("Consistency with the truth", blocks, data)
 
 
@@ -84,7 +89,7 @@ def nees(drive: Drive, errors: Array) -> tuple[Array, NDArray[np.int64]]:
 
 def _rmse(subject: Subject, known: list[tuple[Drive, Array]]) -> dict[str, dict[str, float]]:
     out = {}
-    for i, name in enumerate(subject.states):
+    for i, name in enumerate(subject.names):
         e = np.concatenate([errors[:, i] for _, errors in known])
         var = np.concatenate([drive.sigma[:, i] ** 2 for drive, _ in known])
         there = np.isfinite(e)
@@ -109,3 +114,23 @@ def _picture(subject: Subject, drive: Drive, q: Array, m: NDArray[np.int64], key
     return picture(
         draw, f"NEES, {drive.title}", "normalised estimation error squared over time with its 95 % band", key
     )
+
+
+def _error(subject: Subject, drive: Drive, error: Array, i: int, key: str) -> Picture:
+    t, e, sigma = thin(drive.trace.work.t, error, drive.sigma[:, i], points=300)
+    name = subject.names[i]
+
+    def draw(axes: Any) -> None:
+        axes.fill_between(t, -2 * sigma, 2 * sigma, color=BAND, alpha=0.35, linewidth=0, label="2 σ")
+        axes.plot(t, e, color=ESTIMATE, label="estimate less truth")
+        there = np.isfinite(e) & np.isfinite(sigma)
+        settled = np.flatnonzero(there)[int(there.sum()) // 20 :]
+        if settled.size:  # a wide first band flattens nothing
+            reach = 1.1 * max(float(2 * sigma[settled].max()), float(np.abs(e[there]).max()))
+            axes.set_ylim(-reach, reach) if reach > 0 else None
+        axes.set_xlabel("t [s]" if subject.spec.dt is not None else "step")
+        axes.set_ylabel(f"{name} [rad]")
+
+    rms = figure(float(np.sqrt(np.nanmean(error**2))))
+    said = f"rotation error over time within two claimed standard deviations; its root mean square is {rms} rad"
+    return picture(draw, f"Error {name}, {drive.title}", said, key)
