@@ -1,0 +1,102 @@
+"""Corners of rotations in C: gates beside resets, masks, densities under an exact step, noises that bend an attitude."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from kfgen.generate import build
+from kfgen.native import NativeFilter, load_filters
+from kfgen.reference import reference
+from kfgen.simulate import simulate
+from kfgen.spec import loads
+from kfgen.status import Status
+
+TEXT = """
+kfgen: 1
+name: NAME
+scalar: double
+dt: 0.05
+constants: {down: [0, 0, 1]}
+states:
+  q: {kind: quaternion, init: [0.9, 0.1, -0.3, 0.2], std: [0.2, 0.3, 0.4], error: SIDE}
+  b: {vector: 3, init: 0, std: 0.1}
+covariances: [[q_rx, b_x, 0.005]]
+inputs: {gyro: {vector: 3, range: [-3, 3]}}
+"""
+GATED = """
+dynamics: {form: continuous, f: {q: gyro - b}, Q: {b: 1e-6, q: 1e-4}}
+measurements: {acc: {z: {a: {h: "unrotate(q, down)", std: 0.1}}, gate: {probability: 0.9, reset_after: 2}}}
+"""
+POSE = """
+dynamics: {form: continuous, f: {q: gyro - b}, Q: {b: 1e-6, q: 1e-4}}
+measurements: {pose: {partial: true, z: {q: {h: q, std: [0.1, 0.1, 0.3]}, n: {h: b, std: 0.1}}}}
+"""
+CASES = {
+    f"gate {kind}": (GATED, kind) for kind in ("ekf", "ekf, covariance: full", "ekf, covariance: sqrt", "iekf", "ukf")
+} | {f"mask {kind}": (POSE, kind) for kind in ("ekf", "iekf", "ukf", "ukf, sequential: true")}  # fmt: skip
+
+
+def text_of(case: str, side: str, name: str) -> str:
+    body, kind = CASES[case]
+    text = TEXT + body + f"filter: {{type: {kind}}}\n"
+    return text.replace("NAME", name).replace("SIDE", side)
+
+
+@cache
+def _filters() -> dict[tuple[str, str], NativeFilter]:
+    keys = [(case, side) for case in CASES for side in ("body", "reference")]
+    texts = [text_of(case, side, f"corner_{i}") for i, (case, side) in enumerate(keys)]
+    return dict(zip(keys, load_filters([build(loads(text)) for text in texts]), strict=True))
+
+
+def fresh(case: str, side: str) -> NativeFilter:
+    kf = _filters()[case, side].copy()
+    kf.init()
+    return kf
+
+
+BOTH = pytest.mark.parametrize("side", ["body", "reference"])
+
+
+@BOTH
+@pytest.mark.parametrize("case", CASES)
+def test_agrees_with_the_reference(case: str, side: str) -> None:
+    kf = fresh(case, side)
+    log = simulate(kf.spec, 40, seed=1)
+    result, wanted = kf.run(log), reference(kf.spec).run(log.columns)
+    np.testing.assert_allclose(result.x, wanted.x, atol=1e-9)
+    np.testing.assert_allclose(result.var, wanted.var, rtol=1e-8)
+    np.testing.assert_array_equal(result.status, wanted.status)
+
+
+@BOTH
+@pytest.mark.parametrize("case", [case for case in CASES if case.startswith("gate")])
+def test_a_gate_refuses_whatever_the_reset_does(case: str, side: str) -> None:
+    kf = fresh(case, side)
+    ref = reference(kf.spec)
+    for each in (kf, ref):
+        x, P = each.x, each.P
+        far = [0.0, 0.0, 9.0]
+        assert [each.update("acc", far) for _ in range(2)] == [Status.GATED] * 2
+        np.testing.assert_array_equal(each.x, x)
+        np.testing.assert_array_equal(each.P, P)
+        assert each.update("acc", far) == Status.ANOMALY
+    np.testing.assert_allclose(kf.x, ref.x, atol=1e-9)
+
+
+@BOTH
+@pytest.mark.parametrize("case", [case for case in CASES if case.startswith("mask")])
+def test_a_mask_takes_a_quaternion_as_a_whole_or_not_at_all(case: str, side: str) -> None:
+    """Bits 0 to 3 are the quaternion's; what a mask leaves out may be anything."""
+    kf = fresh(case, side)
+    ref = reference(kf.spec)
+    calls = [(0b1110000, [0, 0, 0, 0, 0.1, 0.2, 0.3]), (0b0010000, [0, np.nan, 0, 0, 0.1, np.inf, 0]),
+             (0b0001111, [1, 0.1, 0, 0, np.nan, 0, np.nan]), (0b1000111, [0, 0, 0, 0, 0, 0, 0.1]),
+             (0, [0] * 7), (0b1111111, [-1, 0.1, 0.2, 0, 0.1, 0.1, 0.2])]  # fmt: skip
+    for mask, z in calls:
+        assert kf.update("pose", z, mask=mask) == ref.update("pose", z, mask=mask) == Status.OK, bin(mask)
+        np.testing.assert_allclose(kf.x, ref.x, atol=1e-9)
+        np.testing.assert_allclose(kf.P, ref.P, atol=1e-12)
