@@ -34,9 +34,17 @@ POSE = """
 dynamics: {form: continuous, f: {q: gyro - b}, Q: {b: 1e-6, q: 1e-4}}
 measurements: {pose: {partial: true, z: {q: {h: q, std: [0.1, 0.1, 0.3]}, n: {h: b, std: 0.1}}}}
 """
+BENT = """
+noise: {w: {std: 0.1}, v: {vector: 3, std: 0.05}}
+dynamics: {form: continuous, f: {q: gyro - b - v, b: "[q.x*w, 0, -b.z]"}, Q: {b: 1e-6, q: 1e-4}}
+measurements: {star: {z: {q: {h: q, std: [0.1, 0.1, 0.3]}}}}
+"""
 CASES = {
     f"gate {kind}": (GATED, kind) for kind in ("ekf", "ekf, covariance: full", "ekf, covariance: sqrt", "iekf", "ukf")
-} | {f"mask {kind}": (POSE, kind) for kind in ("ekf", "iekf", "ukf", "ukf, sequential: true")}  # fmt: skip
+} | {f"mask {kind}": (POSE, kind) for kind in ("ekf", "iekf", "ukf", "ukf, sequential: true")} | {
+    # a part of q times a noise: it is no rotation of the noise
+    f"bent {kind}": (BENT, kind) for kind in ("ekf", "ukf", "ukf, covariance: full")
+}  # fmt: skip
 
 
 def text_of(case: str, side: str, name: str) -> str:
