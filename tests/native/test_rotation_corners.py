@@ -1,4 +1,4 @@
-"""Corners of rotations in C: gates beside resets, masks, densities under an exact step, noises that bend an attitude."""
+"""Corners of rotations in C: gates beside resets, masks, noises that a quaternion multiplies."""
 
 from __future__ import annotations
 
