@@ -23,7 +23,7 @@
  *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * b859b5083c9cb8449ee07b81f5287657e179013392f40cdfe1fea9c937549bd4
+ * 231d152ad75a3536538828434ed336181edea37349fb91f6ff04a696d462345f
  * This file and ahrs.c are yours: use, change and ship them without condition.
  */
 #ifndef AHRS_H_INCLUDED
@@ -112,9 +112,9 @@ typedef struct {
 
 typedef struct {
     ahrs_real_t gyro_noise; /* [rad/s/sqrt(Hz)] more than at rest: scale, alignment */
-    ahrs_real_t field_x;    /* [uT] the earth's field where the device is */
-    ahrs_real_t field_y;    /* [uT] the earth's field where the device is */
-    ahrs_real_t field_z;    /* [uT] the earth's field where the device is */
+    ahrs_real_t field_x;    /* [uT] where the device is */
+    ahrs_real_t field_y;    /* [uT] where the device is */
+    ahrs_real_t field_z;    /* [uT] where the device is */
 } ahrs_parameters_t;
 
 /* The filter. Plain data: copy it, keep as many as you like. */
@@ -206,4 +206,4 @@ void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[36]);
 #endif
 
 #endif
-/* kfgen: body 330f4e0908f3e3ef81f26fc8ae210c90 */
+/* kfgen: body 62390ee1cf6352245f7cb9d907d9e020 */

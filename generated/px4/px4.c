@@ -31,9 +31,12 @@ px4_status_t px4_init(px4_t *kf)
     kf->x[PX4_EARTH_X] = 0.21f;
     kf->x[PX4_EARTH_Y] = 0.02f;
     kf->x[PX4_EARTH_Z] = 0.43f;
-    for (int i = 5; i < 14; i++) {
+    for (int i = 5; i < 11; i++) {
         kf->x[i] = 0.0f;
     }
+    kf->x[PX4_V_N] = 15.0f;
+    kf->x[PX4_V_E] = 0.0f;
+    kf->x[PX4_V_D] = 0.0f;
     kf->x[PX4_Q_W] = 1.0f;
     for (int i = 15; i < 24; i++) {
         kf->x[i] = 0.0f;
@@ -2129,4 +2132,4 @@ px4_status_t px4_get_outputs(const px4_t *kf, px4_outputs_t *value, px4_outputs_
     value->heading = heading;
     return PX4_OK;
 }
-/* kfgen: body ad4ef42d03dabf37481b5d14c7f61a3a */
+/* kfgen: body 9dc2c4729a7b1fc55c4a443083108f16 */

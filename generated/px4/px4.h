@@ -43,7 +43,7 @@
  *   -O2 -fno-inline -fno-tree-pre -fno-reorder-blocks
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * 73fe06d5f84f5eaba8b3566d51be88c8342320699c16f9179f9c5b1865ab836d
+ * fbabca3e0c965cfb80165538f2525c8065273c7cf78cfc3d8310497c3d795a77
  * This file and px4.c are yours: use, change and ship them without condition.
  */
 #ifndef PX4_H_INCLUDED

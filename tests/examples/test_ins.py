@@ -11,7 +11,6 @@ from flight import Flight, fly
 
 import kfgen
 from kfgen.spec.types import Filter
-from tests.examples.conftest import ROOT
 from tests.oracle.error_state import compose, inverse, log
 
 RUNS = 12

@@ -34,14 +34,12 @@ def test_is_as_sure_as_it_may_be(kf, logs):
     """8 runs of 23 degrees of freedom: the band is 1 +- 3 sqrt(2 / 184)."""
     found = [end(kf, columns) for columns in logs]
     nees = np.mean([e @ np.linalg.solve(P, e) / 23 for e, P, _ in found])
-    print(nees, [np.sqrt(np.diag(P)).round(3) for _, P, _ in found[:1]])
-    assert abs(nees - 1) < 0.31
+    assert abs(nees - 1) < 0.31  # measured: 0.89
     assert not any(result.counts(errors=True) for _, _, result in found)
 
 
 def test_airspeed_and_sideslip_tell_the_wind(kf, logs):
     wind = slice(0, 2)
     known, blind = (np.sqrt(np.diag(end(kf, logs[0], w)[1])[wind]) for w in ((), ("airspeed", "sideslip")))
-    print(known, blind)
-    assert np.all(known < 1.2)  # m/s, of 2
+    assert np.all(known < 1)  # m/s, of 2
     assert np.all(blind > 1.95)
