@@ -23,7 +23,7 @@
  *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * 231d152ad75a3536538828434ed336181edea37349fb91f6ff04a696d462345f
+ * abf025d2831a18802b072491fb440bcacd980df8487b5b42f1b048e5bfef3d3d
  * This file and ahrs.c are yours: use, change and ship them without condition.
  */
 #ifndef AHRS_H_INCLUDED

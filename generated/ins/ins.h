@@ -31,7 +31,7 @@
  *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * 8c4f0aaf675219c07a08ebf1f1fb16034102e08b1c63a4c8189040d827c7c5e4
+ * 315bd841227c004394bbfbc8908cdc4225f74a6ed6761deedac1166266f2a101
  * This file and ins.c are yours: use, change and ship them without condition.
  */
 #ifndef INS_H_INCLUDED
