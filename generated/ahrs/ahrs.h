@@ -23,7 +23,7 @@
  *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * abf025d2831a18802b072491fb440bcacd980df8487b5b42f1b048e5bfef3d3d
+ * 5ae18044bf3f42e59597fe048c5fe351d499a9b5050739f7d29228b5a11f12ff
  * This file and ahrs.c are yours: use, change and ship them without condition.
  */
 #ifndef AHRS_H_INCLUDED

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from kfgen.errors import SpecError
 from kfgen.generate import build
 from kfgen.native import NativeFilter, load_filters
 from kfgen.reference import reference
@@ -39,12 +40,17 @@ noise: {w: {std: 0.1}, v: {vector: 3, std: 0.05}}
 dynamics: {form: continuous, f: {q: gyro - b - v, b: "[q.x*w, 0, -b.z]"}, Q: {b: 1e-6, q: 1e-4}}
 measurements: {star: {z: {q: {h: q, std: [0.1, 0.1, 0.3]}}}}
 """
+STILL = """
+noise: {wb: {vector: 3, root_density: 0.01}}
+dynamics: {form: continuous, integrator: exact, f: {b: wb - 0.1*b}, Q: {q: 1e-4}}
+measurements: {star: {z: {q: {h: q, std: [0.1, 0.1, 0.3]}}}}
+"""
 CASES = {
     f"gate {kind}": (GATED, kind) for kind in ("ekf", "ekf, covariance: full", "ekf, covariance: sqrt", "iekf", "ukf")
 } | {f"mask {kind}": (POSE, kind) for kind in ("ekf", "iekf", "ukf", "ukf, sequential: true")} | {
     # a part of q times a noise: it is no rotation of the noise
     f"bent {kind}": (BENT, kind) for kind in ("ekf", "ukf", "ukf, covariance: full")
-}  # fmt: skip
+} | {f"still {kind}": (STILL, kind) for kind in ("ekf", "ukf")}  # fmt: skip
 
 
 def text_of(case: str, side: str, name: str) -> str:
@@ -108,3 +114,9 @@ def test_a_mask_takes_a_quaternion_as_a_whole_or_not_at_all(case: str, side: str
         assert kf.update("pose", z, mask=mask) == ref.update("pose", z, mask=mask) == Status.OK, bin(mask)
         np.testing.assert_allclose(kf.x, ref.x, atol=1e-9)
         np.testing.assert_allclose(kf.P, ref.P, atol=1e-12)
+
+
+def test_an_exact_step_turns_nothing() -> None:
+    text = text_of("still ekf", "body", "turning").replace("f: {b:", "f: {q: gyro - b, b:")
+    with pytest.raises(SpecError, match="the attitude q that turns is none; use rk4"):
+        build(loads(text))
