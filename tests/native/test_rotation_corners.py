@@ -14,6 +14,7 @@ from kfgen.reference import reference
 from kfgen.simulate import simulate
 from kfgen.spec import loads
 from kfgen.status import Status
+from tests.oracle.error_state import Space, upper
 
 TEXT = """
 kfgen: 1
@@ -120,3 +121,49 @@ def test_an_exact_step_turns_nothing() -> None:
     text = text_of("still ekf", "body", "turning").replace("f: {b:", "f: {q: gyro - b, b:")
     with pytest.raises(SpecError, match="the attitude q that turns is none; use rk4"):
         build(loads(text))
+
+
+@pytest.mark.parametrize("case", ["mask ekf", "gate ekf, covariance: full"])
+def test_a_million_steps_of_float(case: str) -> None:
+    """|q| stays 1 and P positive while it tumbles, hardly ever measured."""
+    steps = 1_000_000
+    text = text_of(case, "body", "tumbling").replace("scalar: double", "scalar: float").replace("dt: 0.05", "dt: 0.01")
+    (kf,) = load_filters([build(loads(text))])
+    random, t = np.random.default_rng(4), np.arange(steps) * 0.01
+    columns = {f"gyro_{a}": 3 * np.sin((0.7 + 0.2 * i) * t + i) for i, a in enumerate("xyz")}
+    for name in kf.components("pose" if "mask" in case else "acc"):
+        column = np.full(steps, np.nan)
+        column[::100] = random.standard_normal(steps // 100)
+        columns[f"{'pose' if 'mask' in case else 'acc'}.{name}"] = column
+    result = kf.run(columns)
+    assert not result.counts(errors=True)
+    assert np.max(np.abs(np.linalg.norm(result.x[:, :4], axis=1) - 1)) < 1e-6
+    assert result.var.min() > 0
+    assert np.linalg.eigvalsh(kf.P)[0] > 0
+
+
+@BOTH
+def test_wide_attitudes_come_round(side: str) -> None:
+    """Points beyond pi lie where the rotation takes them: by a dense filter of its own."""
+    text = text_of("bent ukf", side, "wide").replace("std: [0.2, 0.3, 0.4]", "std: [1, 1, 2]").replace("0.005", "0.02")
+    (kf,) = load_filters([build(loads(text))])
+    space = Space(7, (0,), side)
+    P, x = np.diag([1, 1, 4, 0.01, 0.01, 0.01]), np.array([0.9, 0.1, -0.3, 0.2, 0, 0, 0])
+    P[0, 3] = P[3, 0] = 0.02
+    x = space.unit(x)
+    d = np.sqrt(6) * upper(P).T
+    d = np.concatenate([d, -d])
+    z = np.array([-2, 0.4, 0, 0.1]) / np.linalg.norm([-2, 0.4, 0, 0.1])
+    seen = Space(4, (0,), "body")
+    images = [space.plus(x, each)[:4] for each in d]
+    e = np.array([seen.minus(image, x[:4]) for image in images])
+    mean = e.mean(axis=0)
+    T = seen.reset(mean)
+    S = T @ (e - mean).T @ (e - mean) @ T.T / 12 + np.diag([0.01, 0.01, 0.09])
+    K = (d.T @ (e - mean) / 12) @ T.T @ np.linalg.inv(S)
+    dx = K @ seen.minus(z, seen.plus(x[:4], mean))
+    wanted = space.reset(dx) @ (P - K @ S @ K.T) @ space.reset(dx).T
+    for each in (kf, reference(kf.spec)):
+        assert each.update("star", z) == Status.OK
+        np.testing.assert_allclose(each.x, space.plus(x, dx), atol=1e-9)
+        np.testing.assert_allclose(each.P, wanted, atol=1e-9)
