@@ -2,27 +2,28 @@
  *
  * ahrs: attitude and gyro bias from gyro, accelerometer and magnetometer
  *
- * Extended Kalman filter, U D U^T covariance, bierman update, float
+ * Extended Kalman filter, full covariance, standard update, float
  *
  * state x (7)
- *   q0           scalar part
- *   q1
- *   q2
- *   q3
- *   bx  [rad/s]  gyro bias
- *   by  [rad/s]
- *   bz  [rad/s]
+ *   q_w           quaternion  attitude, sensor to earth
+ *   q_x           quaternion  attitude, sensor to earth
+ *   q_y           quaternion  attitude, sensor to earth
+ *   q_z           quaternion  attitude, sensor to earth
+ *   b_x  [rad/s]              gyro bias
+ *   b_y  [rad/s]              gyro bias
+ *   b_z  [rad/s]              gyro bias
  * step: given at each step, clamped to at least 0.001 s, at most 0.1 s
  *
- * RAM 164 bytes a filter. Operations:
- *   predict       504 mul, 322 add, 48 div, 23 compare, 44 select
- *   update_accel  339 mul, 243 add, 21 div, 5 compare
- *   update_mag    354 mul, 255 add, 21 div, 5 compare
+ * RAM 144 bytes a filter. Operations:
+ *   predict       loops
+ *   update_accel  loops
+ *   update_mag    loops
+ *   update_start  loops
  * Recommended with gcc, for these long functions without branches:
  *   -O2 -fno-schedule-insns -flive-range-shrinkage -fno-tree-sink -frename-registers
  *
  * Emitted by kfgen 0.1.0 with SymPy 1.14.0 from the spec with SHA-256
- * 219a179cd2c35a94a5ef8f0d3c46f5dd92dfcd65d45d99ef51e29983c78dfdb5
+ * 5ae18044bf3f42e59597fe048c5fe351d499a9b5050739f7d29228b5a11f12ff
  * This file and ahrs.c are yours: use, change and ship them without condition.
  */
 #ifndef AHRS_H_INCLUDED
@@ -37,19 +38,31 @@ extern "C" {
 #endif
 
 #define AHRS_NX 7
+#define AHRS_NE 6
 #define AHRS_NU 3
 #define AHRS_NZ_ACCEL 3
 #define AHRS_NZ_MAG 3
+#define AHRS_NZ_START 6
 
 /* indices into x */
 enum {
-    AHRS_Q0, /* scalar part */
-    AHRS_Q1,
-    AHRS_Q2,
-    AHRS_Q3,
-    AHRS_BX, /* [rad/s] gyro bias */
-    AHRS_BY, /* [rad/s] */
-    AHRS_BZ  /* [rad/s] */
+    AHRS_Q_W, /* attitude, sensor to earth */
+    AHRS_Q_X, /* attitude, sensor to earth */
+    AHRS_Q_Y, /* attitude, sensor to earth */
+    AHRS_Q_Z, /* attitude, sensor to earth */
+    AHRS_B_X, /* [rad/s] gyro bias */
+    AHRS_B_Y, /* [rad/s] gyro bias */
+    AHRS_B_Z  /* [rad/s] gyro bias */
+};
+
+/* indices into rows and columns of the covariance */
+enum {
+    AHRS_ERROR_Q_RX, /* [rad] of q, in the body's frame */
+    AHRS_ERROR_Q_RY, /* [rad] of q, in the body's frame */
+    AHRS_ERROR_Q_RZ, /* [rad] of q, in the body's frame */
+    AHRS_ERROR_B_X,  /* [rad/s] gyro bias */
+    AHRS_ERROR_B_Y,  /* [rad/s] gyro bias */
+    AHRS_ERROR_B_Z   /* [rad/s] gyro bias */
 };
 
 typedef float ahrs_real_t;
@@ -89,21 +102,30 @@ typedef struct {
 } ahrs_mag_t;
 
 typedef struct {
-    ahrs_real_t gyro_noise;  /* [rad/s/sqrt(Hz)] more than at rest: scale, alignment */
-    ahrs_real_t field_north; /* [uT] */
-    ahrs_real_t field_up;    /* [uT] */
+    ahrs_real_t a_x; /* [m/s^2] */
+    ahrs_real_t a_y; /* [m/s^2] */
+    ahrs_real_t a_z; /* [m/s^2] */
+    ahrs_real_t b_x; /* [uT] */
+    ahrs_real_t b_y; /* [uT] */
+    ahrs_real_t b_z; /* [uT] */
+} ahrs_start_t;
+
+typedef struct {
+    ahrs_real_t gyro_noise; /* [rad/s/sqrt(Hz)] more than at rest: scale, alignment */
+    ahrs_real_t field_x;    /* [uT] where the device is */
+    ahrs_real_t field_y;    /* [uT] where the device is */
+    ahrs_real_t field_z;    /* [uT] where the device is */
 } ahrs_parameters_t;
 
 /* The filter. Plain data: copy it, keep as many as you like. */
 typedef struct {
     ahrs_real_t x[7];             /* state */
-    /* unit upper triangular factor: U_ij, i < j, at j (j - 1) / 2 + i */
-    ahrs_real_t U[21];
-    ahrs_real_t D[7];             /* diagonal factor: P = U D U^T */
+    ahrs_real_t P[21];            /* covariance: P_ij, i <= j, at j (j + 1) / 2 + i */
     ahrs_parameters_t parameters; /* may be changed while the filter runs */
     ahrs_real_t nis;              /* normalised innovation squared of the last update */
     uint32_t gate_count_accel;    /* measurements of accel refused in a row */
     uint32_t gate_count_mag;      /* measurements of mag refused in a row */
+    bool initialized;             /* the first measurement has set the state */
 } ahrs_t;
 
 /**
@@ -120,9 +142,7 @@ ahrs_status_t ahrs_init(ahrs_t *kf);
  * @param kf  filter
  * @param u   gx [rad/s], gy [rad/s], gz [rad/s]
  * @param dt  time step [s]
- * @return AHRS_OK, AHRS_DT_CLAMPED, or an error that leaves *kf as it was
- *
- * 504 mul, 322 add, 48 div, 23 compare, 44 select.
+ * @return AHRS_OK, AHRS_DT_CLAMPED, AHRS_REGULARIZED, or an error that leaves *kf as it was
  */
 ahrs_status_t ahrs_predict(ahrs_t *kf, const ahrs_inputs_t *u, ahrs_real_t dt);
 
@@ -131,9 +151,8 @@ ahrs_status_t ahrs_predict(ahrs_t *kf, const ahrs_inputs_t *u, ahrs_real_t dt);
  *
  * @param kf  filter
  * @param z   x [m/s^2], y [m/s^2], z [m/s^2]
- * @return AHRS_OK, AHRS_ANOMALY, AHRS_GATED, or an error that leaves *kf as it was
- *
- * 339 mul, 243 add, 21 div, 5 compare.
+ * @return AHRS_OK, AHRS_ANOMALY, AHRS_REGULARIZED, AHRS_GATED, or an error that leaves *kf as it
+ *     was
  */
 ahrs_status_t ahrs_update_accel(ahrs_t *kf, const ahrs_accel_t *z);
 
@@ -142,14 +161,22 @@ ahrs_status_t ahrs_update_accel(ahrs_t *kf, const ahrs_accel_t *z);
  *
  * @param kf  filter
  * @param z   x [uT], y [uT], z [uT]
- * @return AHRS_OK, AHRS_ANOMALY, AHRS_GATED, or an error that leaves *kf as it was
- *
- * 354 mul, 255 add, 21 div, 5 compare.
+ * @return AHRS_OK, AHRS_ANOMALY, AHRS_REGULARIZED, AHRS_GATED, or an error that leaves *kf as it
+ *     was
  */
 ahrs_status_t ahrs_update_mag(ahrs_t *kf, const ahrs_mag_t *z);
 
 /**
- * Replace the state; angles are wrapped, the covariance stays.
+ * Take a measurement of start into account.
+ *
+ * @param kf  filter
+ * @param z   a_x [m/s^2], a_y [m/s^2], a_z [m/s^2], b_x [uT], b_y [uT], b_z [uT]
+ * @return AHRS_OK, AHRS_REGULARIZED, or an error that leaves *kf as it was
+ */
+ahrs_status_t ahrs_update_start(ahrs_t *kf, const ahrs_start_t *z);
+
+/**
+ * Replace the state; angles are wrapped, quaternions normalised, the covariance stays.
  *
  * @param kf  filter
  * @param x   new state
@@ -164,7 +191,7 @@ ahrs_status_t ahrs_set_state(ahrs_t *kf, const ahrs_real_t x[7]);
  * @param P   covariance, row-major; the upper triangle is read
  * @return AHRS_OK, or an error that leaves *kf as it was
  */
-ahrs_status_t ahrs_set_covariance(ahrs_t *kf, const ahrs_real_t P[49]);
+ahrs_status_t ahrs_set_covariance(ahrs_t *kf, const ahrs_real_t P[36]);
 
 /**
  * The covariance of the state, in the order of the states.
@@ -172,11 +199,11 @@ ahrs_status_t ahrs_set_covariance(ahrs_t *kf, const ahrs_real_t P[49]);
  * @param kf  filter
  * @param P   covariance, row-major
  */
-void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[49]);
+void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[36]);
 
 #ifdef __cplusplus
 }
 #endif
 
 #endif
-/* kfgen: body 8e3e323cd533ffe612a8d07bd593f7a9 */
+/* kfgen: body 62390ee1cf6352245f7cb9d907d9e020 */

@@ -16,24 +16,29 @@ from kfgen.simulate import simulate
 from kfgen.spec.types import Filter
 from tests.oracle.error_state import compose, exp, inverse, log, matrix
 
-HERE = Path(__file__).parent
-RECORDED = HERE.parents[2] / "shared" / "data" / "imu.csv"
+ROOT = Path(__file__).parents[2]
+RECORDED = ROOT.parent / "shared" / "data" / "imu.csv"
 
 EKF = Filter("ekf", "full", "joseph")
+ITERATED = Filter("iekf", "full", "joseph", iterations=4)
+
+
+@cache
+def inertial():
+    """specs/ins.yaml, begun with its initial attitude, whatever that is worth."""
+    return replace(kfgen.load(ROOT / "specs" / "ins.yaml"), initialize=(), filter=ITERATED)
 
 
 @cache
 def tracks():
     """Logs with truth, whose attitude starts 0.5 rad off about each axis."""
-    spec = kfgen.load(HERE / "ins.yaml")
-    return [simulate(spec, 150, seed=seed, every={"gnss": 10, "mag": 2}).columns for seed in range(6)]
+    return [simulate(inertial(), 150, seed=seed, every={"gnss": 10, "mag": 2}).columns for seed in range(6)]
 
 
-def errors(chosen=None, reset=True):
+def errors(chosen=ITERATED, reset=True):
     """The mean of the normalised error squared per degree of freedom, row by row."""
-    spec = kfgen.load(HERE / "ins.yaml")
-    spec = replace(spec, filter=chosen or replace(spec.filter, covariance="full", update="joseph"),
-                   rotations=tuple(replace(r, reset=reset) for r in spec.rotations))  # fmt: skip
+    spec = inertial()
+    spec = replace(spec, filter=chosen, rotations=tuple(replace(r, reset=reset) for r in spec.rotations))
     kf, found = kfgen.reference(spec), []
     for columns in tracks():
         kf.init()
@@ -74,7 +79,7 @@ def recorded(turn=None):
 
 def attitudes(log, rows, first=True):
     """The attitude row by row [rows, 4]. first: begin with a reading of both."""
-    kf = kfgen.reference(kfgen.load(HERE / "ahrs.yaml"))
+    kf = kfgen.reference(kfgen.load(ROOT / "specs" / "ahrs.yaml"))
     t, u, accel, mag = log
     if first:
         assert kf.update("start", [*accel[0], *mag[0]]) == 0

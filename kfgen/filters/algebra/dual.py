@@ -10,6 +10,7 @@ from typing import Any
 
 from kfgen.filters.algebra.attitude import Attitude
 from kfgen.filters.algebra.gradient import Dual, Gradient, Hessian, nonzero
+from kfgen.geometry.rotation import matrix
 from kfgen.ir.lower import Lowering
 from kfgen.ir.trace import Trace, Value
 from kfgen.model import Model
@@ -118,11 +119,13 @@ def state_seeds(t: Trace, model: Model, x: Sequence[Value]) -> dict[str, Dual]:
 
 
 def held_attitudes(t: Trace, model: Model) -> dict[str, Dual]:
-    """The quaternions as constants of a step."""
+    """The quaternions, of which R(q) is a constant of a step, their numbers are not."""
     out: dict[str, Dual] = {}
     for r in model.rotations:
-        q = [t.field(f"attitude.{part}") for part in r.parts]
-        out.update(zip(r.parts, Attitude(t, r.name, r.geometry, q, [{}, {}, {}], held=True).numbers(), strict=True))
+        q = [t.element("kf.x", r.first + k) for k in range(4)]
+        attitude = Attitude(t, r.name, r.geometry, q, [{}, {}, {}], held=True)
+        attitude.rows = matrix([t.field(f"attitude.{part}") for part in r.parts])
+        out.update(zip(r.parts, attitude.numbers(), strict=True))
     return out
 
 

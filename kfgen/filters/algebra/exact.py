@@ -129,6 +129,13 @@ def _van_loan(A: Any, Qc: Any, dt: Fraction) -> list[list[Fraction]]:
 
 def discretise(model: Model) -> Linear:
     """The closed forms; SpecError where f is not linear in the states or none is found."""
+    for r, turn in zip(model.rotations, model.turns, strict=True):
+        if any(e != 0 for e in turn or ()):
+            raise SpecError.at(
+                model.spec.dynamics.f[r.errors[0]].place,
+                f"integrator exact needs a linear f, and the attitude {r.name} that turns is none",
+                "use rk4; or euler, which turns it exactly where its rate is constant over the step",
+            )
     definitions = {model.symbols[name]: e for name, e in model.definitions}
 
     def flat(e: Any) -> Any:

@@ -100,6 +100,7 @@ class Ekf(SingleFilter):
         innovation = self.innovation(u, linear)
         result = self.sequence(u, innovation, plain=True)
         final = yield from self.final(u, innovation, result)
+        textbook = final is result
         x = self.moved(u, final.motion)
         if u.turns:
             final = replace(final, P=self.reset(u, final.P))
@@ -108,13 +109,13 @@ class Ekf(SingleFilter):
         P = self.limited(t, final.P)
         u.free, x = x, self.state.confined(t, x)
         t.section("guards")
-        if final is result and sensor.gate is None:
+        if textbook and sensor.gate is None:
             guards.doubts(t, [*self._model_values(innovation), *u.tested])
             # nis shows whether z is finite, but for components that may have been skipped
             skippable = [v for v, r in zip(innovation.y, innovation.variances, strict=True) if not is_positive(r)]
             guards.finite(t, [*skippable, *x, result.nis, *evidence, *u.tested], self._entering(innovation, result))
             self._positive(u, result)
-        elif final is result:
+        elif textbook:
             yield from self.judged(u, innovation, result)
             guards.finite(t, [result.nis, *x, *evidence])
         else:

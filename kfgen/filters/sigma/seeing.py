@@ -59,7 +59,7 @@ class Seeing:
         model, sensor = self.model, self.sensor
         if self.kept is not None or self.recalls or self.carried or not self.points.exact:
             return False
-        if any(b is not None for b in model.bounds):
+        if any(b is not None for b in model.bounds) or sensor.rotations:  # rotations beyond pi come round
             return False
         if any(not part.flat for _, _, part in self.images.singles) or any(r is not None for r in sensor.residual):
             return False

@@ -160,10 +160,13 @@ def advance(
         assert step.dt is not None
         if model.spec.dynamics.integrator == "exact":
             linear = discretise(model)
-            after = linear.advance(t, at_prior, prior.duals, step.dt)
+            after = _with_attitudes(model, linear.advance(t, at_prior, prior.duals, step.dt), prior.duals)
             steps = {i: linear.step(i, at_prior, prior.duals) for i in compensated(model)}
             index = [i for i, w in enumerate(model.noises) if w.density]
             added, extra = linear.noise(t, at_prior, [[Qw[i][j] for j in index] for i in index], step.dt)
+            own = model.space.numbers_of  # a rotation stands still
+            added = [[t.zero if i is None or j is None else added[i][j] for j in own] for i in own]
+            extra = [([t.zero if i is None else w[i] for i in own], d) for w, d in extra]
             Q = [[a + b for a, b in zip(r, s, strict=True)] for r, s in zip(Q, added, strict=True)]
         else:
             after, moved_by = integrate(t, model, prior.duals, step.dt, held, derivatives)
@@ -184,10 +187,17 @@ def moved(t: Trace, model: Model, duals: dict[str, Dual], dt: Value | None) -> l
         return [d.value for d in stepped(t, model, Evaluator(t, model, duals))]
     assert dt is not None
     if model.spec.dynamics.integrator == "exact":
-        after = discretise(model).advance(t, Evaluator(t, model, duals), duals, dt)
+        after = _with_attitudes(model, discretise(model).advance(t, Evaluator(t, model, duals), duals, dt), duals)
     else:
         after, _ = integrate(t, model, duals, dt, [w.name for w in model.noises if not w.density], 1)
     return [d.value for d in after]
+
+
+def _with_attitudes(model: Model, after: list[Dual], before: dict[str, Dual]) -> list[Dual]:
+    """x after an exact step, in which no rotation turns."""
+    for r in model.rotations:
+        after[r.first : r.first + 4] = [before[part] for part in r.parts]
+    return after
 
 
 def _columns(t: Trace, model: Model, after: list[Dual], names: list[str], Qw: Rows, dt: Value | None
