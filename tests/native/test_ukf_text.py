@@ -93,7 +93,7 @@ def test_what_is_private(tmp_path):
         assert private
         for function in private:
             assert f"{name}_{function}(" not in header, function
-            assert re.search(rf"^static void {name}_{function}\(", each.files[f"{name}.c"], re.MULTILINE), function
+            assert re.search(rf"^static \w+ {name}_{function}\(", each.files[f"{name}.c"], re.MULTILINE), function
             assert f"{name}_{function}" not in dict(each.summary.rows)
         assert set(re.findall(rf"\b({name}_\w+)\(", header)) == public_of(each)
         kept = each.code.model.spec.filter.sigma_points
