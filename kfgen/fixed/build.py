@@ -38,10 +38,10 @@ from kfgen.logs import Log
 
 WIDER = 2.0**6  # times what runs have met: an interval that is wider than that has overrated its value
 DRIVEN, TRIED = 21, 31  # seeds of the runs over the box, of the first trial
-TRIALS = 4  # each with runs of its own, until nothing saturates
+TRIALS = 2  # each with runs of its own, until nothing saturates
 MANY, FEW = 16, 8  # legs that fill the box, of the runs and of a trial
 ROWS, LEAST = 40, 4  # rows of a leg, beside those without readings; the least of rows and legs
-OUTAGES = (24, 12, 4, 0)  # rows without readings
+OUTAGES = (24, 12, 0)  # rows without readings
 SIZE = 2000  # operations of a program from which on runs are shorter
 SHORT = 12  # what is less than that is told of
 
@@ -125,13 +125,14 @@ class _Builder:
 
     def build(self) -> FixedFilter:
         refusals: list[SpecError] = []
-        for part in self._parts():
+        parts = self._parts()
+        for part in parts:
             self.ranges.restore(self.met)
             drive = Drive(self.weather, part.box, part.outage)
             if self.box.wide:
                 self._see(drive, part)
             try:
-                made = self._toured(drive, part)
+                made = self._toured(drive, part, part is parts[-1])
             except SpecError as error:
                 refusals.append(error)
             else:
@@ -155,8 +156,9 @@ class _Builder:
         self.sizes = intervals.sizes
         spread(intervals, WIDER)
 
-    def _toured(self, drive: Drive, part: Part) -> FixedFilter:
-        """A filter that has been tried all over a part; what its trial has met counts where something saturated."""
+    def _toured(self, drive: Drive, part: Part, last: bool) -> FixedFilter:
+        """A filter that has been tried all over a part; what its trial has met counts where something saturated. last:
+        there is no smaller part."""
         for trial in range(TRIALS):
             found = self._lowered(part.spare)
             told = self._judged(found)
@@ -167,7 +169,7 @@ class _Builder:
         if not tour.found.carried:
             shaken = ShakenTour(self.program, self.real, found.formats, self.box, part.limits)
             self._run(drive, shaken, TRIED + trial, FEW)
-            refuse(tour.found, shaken.found, self.real, found.formats, self.scalar)
+            told = *told, *refuse(tour.found, shaken.found, self.real, found.formats, self.scalar, last)
         return replace(self._filter(found), widest=dict(drive.seen) if self.box.wide else {}, told=told)
 
     def _run(self, drive: Drive, player: Player, seed: int, inner: int) -> None:

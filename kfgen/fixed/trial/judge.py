@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from kfgen.errors import Mistake, SpecError
+from kfgen.errors import Mistake, Place, SpecError
 from kfgen.filters.base import FilterCode
 from kfgen.fixed.arithmetic.scalar import Fixed
 from kfgen.fixed.formats.formats import Formats
@@ -70,16 +70,19 @@ def hear(spec: Spec, heard: Collection[str]) -> None:
         raise SpecError(mistakes)
 
 
-def refuse(found: Found, shaken: Found, real: FilterCode, formats: Formats, scalar: Fixed) -> None:
+def refuse(
+    found: Found, shaken: Found, real: FilterCode, formats: Formats, scalar: Fixed, last: bool
+) -> tuple[str, ...]:
     """SpecError where the integers have not followed everywhere in the declared box.
 
-    shaken: what digits that no format keeps make of the model there, which may magnify whatever is rounded.
+    shaken: what digits that no format keeps make of the model there, which may magnify whatever is rounded. last: what
+    saturates now and then, with the flag, but follows all the same, is told instead.
     """
-    if found.saturated:
-        _saturated(found, real, scalar)
+    if found.saturated and not last:
+        raise SpecError.at(*_saturated(found, real, scalar))
     far = found.sigmas > max(MARGIN * FAILING, CHAOTIC * shaken.sigmas)
     if not far and found.share <= max(MARGIN * WIDE, CHAOTIC * shaken.share) and not found.errors:
-        return
+        return ("; ".join(_saturated(found, real, scalar)[1:]),) if found.saturated else ()
     i = found.state if far else found.widest
     bits = max(_missing(found.sigmas), math.ceil(math.log2(max(min(found.share, 1e9) / (MARGIN * WIDE), 2.0))))
     what = _carrying(formats, i, real, scalar)
@@ -90,11 +93,11 @@ def refuse(found: Found, shaken: Found, real: FilterCode, formats: Formats, scal
     )  # fmt: skip
 
 
-def _saturated(found: Found, real: FilterCode, scalar: Fixed) -> None:
-    """SpecError: something has no format that holds it everywhere."""
+def _saturated(found: Found, real: FilterCode, scalar: Fixed) -> tuple[Place, str, str]:
+    """That something has no format that holds it everywhere: where, what, what to do."""
     function, times = found.saturated.most_common(1)[0]
     i = found.widest if found.share > 0 else found.state
-    raise SpecError.at(
+    return (
         real.model.spec.states[i].place,
         f"{scalar.name} cannot carry all that `{function}` computes in the declared ranges: it saturates in {times} of "
         f"{found.rows} steps; 1 bit missing, at least",
