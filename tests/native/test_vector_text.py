@@ -68,7 +68,7 @@ states:
   b: {vector: 3, init: 0, std: [0.1, 0.2, 0.3], range: [-1, 1]}
 inputs: {gyro: {vector: 3, unit: rad/s}}
 noise: {w: {vector: 3, std: 0.01}}
-dynamics: {f: {th: th + dt*(gyro - b + w)}, Q: {b: 1e-6}}
+dynamics: {f: {th: th + dt*(gyro - b + w)}, Q: {b: 1e-5}}
 measurements:
   acc:
     noise: {eps: {vector: 2, std: [0.1, 0.2]}}
@@ -90,7 +90,7 @@ inputs: {gyro_x: {unit: rad/s}, gyro_y: {unit: rad/s}, gyro_z: {unit: rad/s}}
 noise: {w_x: {std: 0.01}, w_y: {std: 0.01}, w_z: {std: 0.01}}
 dynamics:
   f: {th_r: th_r + dt*(gyro_x - b_x + w_x), th_p: th_p + dt*(gyro_y - b_y + w_y), th_y: th_y + dt*(gyro_z - b_z + w_z)}
-  Q: {b_x: 1e-6, b_y: 1e-6, b_z: 1e-6}
+  Q: {b_x: 1e-5, b_y: 1e-5, b_z: 1e-5}
 measurements:
   acc:
     noise: {eps_x: {std: 0.1}, eps_y: {std: 0.2}}

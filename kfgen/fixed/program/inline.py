@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from kfgen.fixed.program.nodes import make, nodes_of
 from kfgen.ir.nodes import Node
-from kfgen.ir.program import Call, Declare, For, Function, If, Let, Slice, Statement, Store, mapped, walk
+from kfgen.ir.program import Assign, Call, Declare, For, Function, If, Let, Slice, Statement, Store, mapped, walk
 
 
 def inlined(functions: Iterable[Function]) -> tuple[Function, ...]:
@@ -27,7 +27,7 @@ def _block(body: list[Statement]) -> list[Statement]:
         if isinstance(s, For | If):
             out.append(replace(s, body=_block(s.body)))
         elif isinstance(s, Call) and _goes_through(s):
-            out += _Inliner(s).block(s.callee.body)
+            out += _block(_Inliner(s).block(s.callee.body))
         else:
             out.append(s)
     return out
@@ -64,6 +64,10 @@ class _Inliner:
         match s:
             case Let(name=name) | Declare(name=name):
                 return replace(s, name=self.names[name])
+            case Assign(name=name):
+                return replace(s, name=self.names.get(name, name))
+            case Call(args=args):
+                return replace(s, args=[self.part(a) if isinstance(a, Slice) else a for a in args])
             case Store(name=name, index=index) if name in self.arrays and index is not None:
                 return replace(s, name=self.arrays[name].array, index=self.index(name, index))
             case For(body=body) | If(body=body):
@@ -81,6 +85,13 @@ class _Inliner:
             place = self.index(n.data, self.node(n.args[0]))
             return make(n.op, (place,), self.arrays[n.data].array, n.kind)
         return make(n.op, tuple(map(self.node, n.args)), n.data, n.kind) if n.args else n
+
+    def part(self, given: Slice) -> Slice:
+        """A part of an array that the callee hands on: of its own, or of one that it was given."""
+        if given.array in self.arrays:
+            whole = self.arrays[given.array]
+            return replace(given, array=whole.array, offset=self.index(given.array, given.offset))
+        return replace(given, array=self.names.get(given.array, given.array))
 
     def index(self, name: str, place: Node) -> Node:
         offset = self.arrays[name].offset
