@@ -104,7 +104,7 @@ def test_in_fixed_point(kind) -> None:
         ref.predict(dt=dt)
         ref.update("m", z)
     assert np.all(np.abs(kf.x - ref.x) < 0.1 * np.sqrt(ref.P.diagonal()))  # what fixed point promises in its box
-    np.testing.assert_allclose(kf.Q, ref.Q, rtol=0.02, atol=1e-4)
+    np.testing.assert_allclose(kf.Q, ref.Q, rtol=0.05, atol=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ measurements:
     noise: {eps: {vector: 2, std: [0.1, 0.2]}}
     z: {a: {h: "[sin(th.p)*(1 + eps.x), -cos(th.p)*sin(th.r) + eps.y]"}}
   mag: {z: {y: {h: th.y, std: 0.1, kind: angle}, s: {h: "where(th.y > 0, [th.r, b.x], [b.y, b.z])", std: 1}}}
-filter: {type: ukf}
+filter: {type: ukf, covariance: full}
 """,
         """kfgen: 1
 name: angles
@@ -98,7 +98,7 @@ measurements:
   mag: {z: {y: {h: th_y, std: 0.1, kind: angle},
             s_x: {h: "where(th_y > 0, th_r, b_y)", std: 1},
             s_y: {h: "where(th_y > 0, b_x, b_z)", std: 1}}}
-filter: {type: ukf}
+filter: {type: ukf, covariance: full}
 """,
     ),
     "chain": (

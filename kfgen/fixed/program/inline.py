@@ -6,8 +6,9 @@ an element of a covariance is to have one of its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import count
 
 from kfgen.fixed.program.nodes import make, nodes_of
 from kfgen.ir.nodes import Node
@@ -16,18 +17,19 @@ from kfgen.ir.program import Assign, Call, Declare, For, Function, If, Let, Slic
 
 def inlined(functions: Iterable[Function]) -> tuple[Function, ...]:
     """The functions without such calls, and without those that nobody calls any more."""
-    made = [replace(f, body=_block(f.body)) for f in functions]
+    made = [replace(f, body=_block(f.body, count(1))) for f in functions]
     called = {s.callee.name for f in made for s in walk(f.body) if isinstance(s, Call)}
     return tuple(f for f in made if not f.private or f.name in called)
 
 
-def _block(body: list[Statement]) -> list[Statement]:
+def _block(body: list[Statement], calls: Iterator[int]) -> list[Statement]:
+    """calls: numbers for the locals of what is written out, so that two calls of one function share none."""
     out: list[Statement] = []
     for s in body:
         if isinstance(s, For | If):
-            out.append(replace(s, body=_block(s.body)))
+            out.append(replace(s, body=_block(s.body, calls)))
         elif isinstance(s, Call) and _goes_through(s):
-            out += _block(_Inliner(s).block(s.callee.body))
+            out += _block(_Inliner(s, next(calls)).block(s.callee.body), calls)
         else:
             out.append(s)
     return out
@@ -48,13 +50,12 @@ def _goes_through(s: Call) -> bool:
 class _Inliner:
     """The body of a callee with what one call gives it."""
 
-    def __init__(self, s: Call) -> None:
+    def __init__(self, s: Call, number: int) -> None:
         pairs = list(zip(s.callee.arguments, s.args, strict=True))
         self.arrays: Mapping[str, Slice] = {a.name: g for a, g in pairs if isinstance(g, Slice)}
         self.numbers: Mapping[str, Node] = {a.name: g for a, g in pairs if isinstance(g, Node)}
-        self.names = {
-            each.name: f"{s.callee.name}_{each.name}" for each in walk(s.callee.body) if isinstance(each, Let | Declare)
-        }
+        own = [each.name for each in walk(s.callee.body) if isinstance(each, Let | Declare)]
+        self.names = {name: f"{s.callee.name}_{number}_{name}" for name in own}
 
     def block(self, body: list[Statement]) -> list[Statement]:
         return [self.statement(s) for s in body]
