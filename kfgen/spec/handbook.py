@@ -41,6 +41,12 @@ A float of 4.2e6 m has its last digit at half a metre: a step of 0.15 m is lost 
 `x_rest` is the estimate. Over 15 s at 17 m/s a plain float filter goes 80 m astray, a compensated one 8 mm
 (`tests/native/test_compensated.py`).
 
+## In C++
+
+The headers compile as C++ too, and there is no view of spans beside them: fields and indices have names already
+(`kf.x[VEHICLE_SPEED]`), getters take arrays, and a second interface would have to be learnt and kept in step to save
+nothing.
+
 ## From a log to trust
 
 `kfgen report vehicle.yaml --log drive.csv -o report.html` writes one page that a reviewer can sign: the equations,
