@@ -258,33 +258,33 @@ ahrs_status_t ahrs_predict(ahrs_t *kf, const ahrs_inputs_t *u, ahrs_real_t dt)
     kf->x[AHRS_Q_X] = q_x_next;
     kf->x[AHRS_Q_Y] = q_y_next;
     kf->x[AHRS_Q_Z] = q_z_next;
-    const uint32_t signs = ahrs_sign_bit(p_q_rx_q_rx_next);
-    kf->P[0] = p_q_rx_q_rx_next;
-    const float p_q_rx_q_ry_next = t42 * f_q_rx_q_rx + t43 * f_q_rx_q_ry + t44 * f_q_rx_q_rz
-        - p_q_ry_b_x_next * t33 - p_q_ry_b_y_next * t36 - p_q_ry_b_z_next * t39;
-    kf->P[1] = p_q_rx_q_ry_next;
-    const uint32_t signs_1 = signs | ahrs_sign_bit(p_q_ry_q_ry_next);
-    kf->P[2] = p_q_ry_q_ry_next;
-    const float p_q_rx_q_rz_next = t45 * f_q_rx_q_rx + t46 * f_q_rx_q_ry + t47 * f_q_rx_q_rz
-        - p_q_rz_b_x_next * t33 - p_q_rz_b_y_next * t36 - p_q_rz_b_z_next * t39;
-    kf->P[3] = p_q_rx_q_rz_next;
+    kf->P[20] = p_b_z_b_z_next;
+    kf->P[14] = p_b_y_b_y_next;
+    kf->P[9] = p_b_x_b_x_next;
+    kf->P[17] = p_q_rz_b_z_next;
+    kf->P[12] = p_q_rz_b_y_next;
+    kf->P[8] = p_q_rz_b_x_next;
+    const uint32_t signs = ahrs_sign_bit(p_q_rz_q_rz_next);
+    kf->P[5] = p_q_rz_q_rz_next;
+    kf->P[16] = p_q_ry_b_z_next;
+    kf->P[11] = p_q_ry_b_y_next;
+    kf->P[7] = p_q_ry_b_x_next;
     const float p_q_ry_q_rz_next = t45 * f_q_ry_q_rx + t46 * f_q_ry_q_ry + t47 * f_q_ry_q_rz
         - p_q_rz_b_x_next * t34 - p_q_rz_b_y_next * t37 - p_q_rz_b_z_next * t40;
     kf->P[4] = p_q_ry_q_rz_next;
-    const uint32_t signs_2 = signs_1 | ahrs_sign_bit(p_q_rz_q_rz_next);
-    kf->P[5] = p_q_rz_q_rz_next;
-    kf->P[6] = p_q_rx_b_x_next;
-    kf->P[7] = p_q_ry_b_x_next;
-    kf->P[8] = p_q_rz_b_x_next;
-    kf->P[9] = p_b_x_b_x_next;
-    kf->P[10] = p_q_rx_b_y_next;
-    kf->P[11] = p_q_ry_b_y_next;
-    kf->P[12] = p_q_rz_b_y_next;
-    kf->P[14] = p_b_y_b_y_next;
+    const uint32_t signs_1 = signs | ahrs_sign_bit(p_q_ry_q_ry_next);
+    kf->P[2] = p_q_ry_q_ry_next;
     kf->P[15] = p_q_rx_b_z_next;
-    kf->P[16] = p_q_ry_b_z_next;
-    kf->P[17] = p_q_rz_b_z_next;
-    kf->P[20] = p_b_z_b_z_next;
+    kf->P[10] = p_q_rx_b_y_next;
+    kf->P[6] = p_q_rx_b_x_next;
+    const float p_q_rx_q_rz_next = t45 * f_q_rx_q_rx + t46 * f_q_rx_q_ry + t47 * f_q_rx_q_rz
+        - p_q_rz_b_x_next * t33 - p_q_rz_b_y_next * t36 - p_q_rz_b_z_next * t39;
+    kf->P[3] = p_q_rx_q_rz_next;
+    const float p_q_rx_q_ry_next = t42 * f_q_rx_q_rx + t43 * f_q_rx_q_ry + t44 * f_q_rx_q_rz
+        - p_q_ry_b_x_next * t33 - p_q_ry_b_y_next * t36 - p_q_ry_b_z_next * t39;
+    kf->P[1] = p_q_rx_q_ry_next;
+    const uint32_t signs_2 = signs_1 | ahrs_sign_bit(p_q_rx_q_rx_next);
+    kf->P[0] = p_q_rx_q_rx_next;
     if (signs_2 != 0u) {
         flags |= ahrs_settle(kf->P, 0);
     }
@@ -1437,4 +1437,4 @@ void ahrs_get_covariance(const ahrs_t *kf, ahrs_real_t P[36])
         }
     }
 }
-/* kfgen: body 822ff3ff07ab065597ad9b7b7cd69fad */
+/* kfgen: body 169efe00f4005826f0551b8e74f700e9 */

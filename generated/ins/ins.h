@@ -21,6 +21,8 @@
  *   ba_x  [m/s^2]              accelerometer bias
  *   ba_y  [m/s^2]              accelerometer bias
  *   ba_z  [m/s^2]              accelerometer bias
+ * order of the states inside U and D
+ *   p_x, p_y, p_z, v_x, v_y, v_z, q_rx, q_ry, q_rz, ba_x, ba_y, ba_z, bg_x, bg_y, bg_z
  * step: 0.01 s, compiled in
  *
  * RAM 564 bytes a filter. Operations:
@@ -222,4 +224,4 @@ void ins_get_covariance(const ins_t *kf, ins_real_t P[225]);
 #endif
 
 #endif
-/* kfgen: body 1625961aeb8dc35537d565fd5f3d81ca */
+/* kfgen: body cf8052364f9b05983135a7ff3121e78c */
