@@ -7,6 +7,7 @@ is a failure.
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -28,12 +29,13 @@ def report(*call: str | Path) -> str:
 @pytest.mark.parametrize("source", [
     pytest.param(path, marks=[pytest.mark.long] if path.stat().st_size > LARGE else []) for path in SOURCES
 ], ids=lambda path: path.stem)  # fmt: skip
-def test_misra(needs, source):
+def test_misra(needs, source, tmp_path):
     needs("cppcheck")
+    copy = shutil.copytree(source.parent, tmp_path / source.stem) / source.name  # its dumps lie beside it
     # -U: these are other translation units, which the compilers of those targets see
     elsewhere = ["-U__AVR__", "-U__FAST_MATH__", "-U__cplusplus"]
     options = ["--quiet", "--std=c99", "--addon=misra", "--enable=warning,portability", *elsewhere]
-    text = report("cppcheck", *options, source)
+    text = report("cppcheck", *options, copy)
     rules = set(re.findall(r"\[misra-c2012-([\d.]+)\]", text))
     assert rules - DEVIATIONS == set(), text
     others = [line for line in text.splitlines() if re.search(r": (error|warning|portability): .*\[\w+\]$", line)]
