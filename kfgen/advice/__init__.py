@@ -13,7 +13,7 @@ from kfgen.spec.types import Spec
 if TYPE_CHECKING:
     from kfgen.generate import Generated
 
-RUN = ("far_origin", "precision", "sigma_angle", "unobservable")
+RUN = ("far_origin", "precision", "robust_start", "sigma_angle", "unobservable")
 """The advice that takes a run."""
 
 

@@ -1,4 +1,4 @@
-"""Advice on how wide the filter starts: beyond a float's reach, or around an angle's circle."""
+"""Advice on how wide the filter starts: beyond a float's reach, what robust updates believe, or around a circle."""
 
 from __future__ import annotations
 
@@ -14,28 +14,54 @@ from kfgen.reference.sigma_points import SigmaRule
 from kfgen.scalar_names import FLOAT
 from kfgen.spec.advice.usage import closure
 from kfgen.spec.problems import short
+from kfgen.spec.sensors import filter_of
 from kfgen.spec.tree import names
 from kfgen.spec.types import Sensor, Spec
 
 REACH = 2.0**24  # of a float: a variance that an update makes smaller by more is all round-off
+GLITCH = 6.0  # sigma of R, from which on chernodarov and huber leave P alone
 
 
 def advice(spec: Spec, tracks: Sequence[Track]) -> Iterator[Advice]:
     for track in tracks:
         if spec.scalar == FLOAT and track.spec.filter.covariance == "full":
             yield from _precision(track)
+        yield from _robust(track)
         if track.spec.filter.type == "ukf":
             yield from _angles(track)
 
 
+def _first(track: Track, sensor: Sensor) -> tuple[int, float]:
+    """The component whose h is the least known against R at the first update, and H P0 H^T / R of it."""
+    H, R = track.H[sensor.name][0], track.R[sensor.name]
+    ratios = [float(h @ track.model.P0 @ h / r) if r > 0 else 0.0 for h, r in zip(H, np.diag(R), strict=True)]
+    i = int(np.argmax(ratios))
+    return i, ratios[i]
+
+
+def _robust(track: Track) -> Iterator[Advice]:
+    """A robust update normalises an innovation by the root of R alone: a wide start looks like an outlier."""
+    if track.spec.initialize:
+        return
+    for sensor in track.spec.measurements:
+        robust = filter_of(track.spec.filter, sensor).robust
+        i, ratio = _first(track, sensor)
+        if robust is None or robust.influence not in ("chernodarov", "huber") or ratio <= GLITCH**2:
+            continue
+        text = (
+            f"the first innovation is expected at {np.sqrt(1 + ratio):.2g} deviations of R, and `robust` takes beyond "
+            f"{GLITCH:.0f} for a glitch: x jumps, P does not fall"
+        )
+        cure = "start with `initialize`, with a smaller std of the states, or without robust"
+        yield Advice(_places(sensor)[sensor.errors[i]], text, cure, "robust_start")
+
+
 def _precision(track: Track) -> Iterator[Advice]:
     for sensor in track.spec.measurements:
-        H, R = track.H[sensor.name][0], track.R[sensor.name]
-        ratios = np.array([h @ track.model.P0 @ h / r if r > 0 else 0.0 for h, r in zip(H, np.diag(R), strict=True)])
-        i = int(np.argmax(ratios))
-        if ratios[i] > REACH:
+        i, ratio = _first(track, sensor)
+        if ratio > REACH:
             text = (
-                f"the first update makes a variance {ratios[i]:.0e} times smaller, and float resolves {REACH:.0e}: "
+                f"the first update makes a variance {ratio:.0e} times smaller, and float resolves {REACH:.0e}: "
                 "`covariance: full` keeps little of it but round-off"
             )
             cure = "choose `covariance: ud` or `sqrt`, or `scalar: double`, or start with smaller variances"

@@ -34,6 +34,7 @@ ADVICE = {
     "degrees": "an angle, or what stands in a sine, is in degrees",
     "std_variance": "a `std` looks like a variance (`sigma**2`, `var_x`), or a `var` like a deviation",
     "precision": "P0 exceeds R by more than a float resolves, with `covariance: full`",
+    "robust_start": "P0 is so large against R that a robust update takes the first measurement for a glitch",
     "far_origin": "8 roundings of a float of a state's size exceed a tenth of its sigma, or take its motion",
     "sigma_angle": "sigma points lie more than half a turn from the mean of an angle that f or h bends",
     "alpha": "alpha makes weights that the scalar cannot carry",

@@ -85,6 +85,9 @@ DUE = [
      "states.p: float resolves `p` to 0.5"),
     ([("std: 0.3", "std: 1e-5"), ("type: ekf", "type: ekf, covariance: full")], "precision",
      "`covariance: full` keeps"),
+    # a wide start, which robust updates take for a glitch
+    ([("std: 0.3", "std: 0.1"), ("type: ekf", "type: ekf, robust: huber")], "robust_start",
+     "measurements.pos.z.p.std: the first innovation is expected at 10 deviations of R"),
 ]  # fmt: skip
 
 
@@ -146,6 +149,11 @@ SENSIBLE = {
     "parameter noise": [("dt: 0.1", "parameters: {q: 0}\ndt: 0.1"), ("v: 0.01", "v: q")],
     "let in noise": [("dynamics:", "let: {s: w*2}\nnoise: {w: {std: 1}}\ndynamics:"), ("0.98*v", "0.98*v + s")],
     "gate, partial": [("z: {p:", "partial: true, gate: {probability: 0.99}, z: {p:")],
+    "robust, known": [("type: ekf", "type: ekf, robust: huber")],
+    "robust, initialized": [("std: 0.3", "std: 0.1"), ("type: ekf", "type: ekf, robust: chernodarov"),
+                            ("dt: 0.1", "initialize: {from: pos, states: {p: p}}\ndt: 0.1")],
+    "robust elsewhere": [("type: ekf", "type: ekf, robust: huber"), ("z: {p:", "robust: none, z: {p:"),
+                         ("std: 0.3", "std: 0.1")],
     "run-time dt": [("dt: 0.1", "dt: {nominal: 0.1, min: 0.01, max: 1}")],
 }  # fmt: skip
 

@@ -156,6 +156,26 @@ def test_what_32_bits_cannot_hold_is_refused_with_a_range_that_would_do():
         build(loads(text.replace("sigma: {value: 1.0", "sigma: {value: 0.1")))
 
 
+def test_no_range_is_proposed_that_leaves_nothing():
+    text = """kfgen: 1
+name: heater
+scalar: q16.16
+filter: {type: ekf, covariance: full}
+dt: {nominal: 0.1, min: 0.01, max: 1}
+states:
+  Ta: {init: 20, std: 1e3, range: [-40, 120]}
+  Tp: {init: 20, std: 1e3, range: [-40, 400]}
+  k: {init: 0.05, std: 0.02, range: [0.01, 0.2]}
+inputs: {P: {range: [0, 100]}}
+dynamics: {form: continuous, f: {Tp: 0.02*P - k*(Tp - Ta), Ta: 0, k: 0}, Q: {Tp: 1e-3*dt, Ta: 1e-4*dt, k: 1e-8*dt}}
+measurements: {ambient: {z: {ta: {h: Ta, std: 1e-3}}}, plate: {z: {tp: {h: Tp, std: 0.5}}, robust: huber}}
+"""
+    with pytest.raises(SpecError) as refused:
+        build(loads(text))
+    assert "would fit" not in str(refused.value)
+    assert "a smaller std, give what sees it a larger one" in str(refused.value)
+
+
 def test_a_sensor_that_never_measures_anything_is_refused():
     text = ANGLE.replace("init: 0, std: 0.3", "init: -2, std: 0.01")
     text = text.replace("m: {z:", "n: {z: {b: {h: log(w), std: 1}}}, m: {z:")

@@ -21,6 +21,7 @@ from kfgen.spec.types import Spec
 PROBED = 120  # rows that the integers are tried on
 CLOSE = 0.01  # standard deviations, and share of a variance: half of what `check` allows
 CHAOTIC = 16.0  # times as far as real numbers depart by less than what formats lose
+NARROWED = 12  # bits: no range that is narrower by more is of use
 
 
 def judge(program: RealProgram, real: FilterCode, integers: IntegerProgram, integer: FilterCode, formats: Formats,
@@ -106,8 +107,11 @@ def _saturated(found: Found, real: FilterCode, scalar: Fixed) -> tuple[Place, st
 
 
 def _cure(real: FilterCode, i: int, bits: int) -> str:
-    cure = f"start with a smaller std, declare a range, {_other(real)}"
-    return cure if real.model.spec.states[i].range is None else f"{_narrower(real, i, bits)}; or {cure}"
+    if bits > NARROWED:
+        return f"start with a smaller std, give what sees it a larger one, {_other(real)}"
+    if real.model.spec.states[i].range is None:
+        return f"start with a smaller std, declare a range, {_other(real)}"
+    return f"{_narrower(real, i, bits)}; or start with a smaller std, {_other(real)}"
 
 
 def _other(real: FilterCode) -> str:
