@@ -6,10 +6,9 @@ import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 from functools import cache
-from importlib.resources import as_file, files
-from pathlib import Path
 
 from kfgen.errors import KfgenError
+from kfgen.packaged import texts
 
 SCHEMA = "kfgen.schema.json"
 MODELINE = f"# yaml-language-server: $schema={SCHEMA}\n"
@@ -18,10 +17,8 @@ _FIELD = r"^{}: *(.*?) *(?:#.*)?$"
 
 @cache
 def examples() -> Mapping[str, str]:
-    """Name -> text of each example: package data of an installed kfgen, the folder beside the package in a checkout."""
-    with as_file(files("kfgen") / "specs") as packaged:
-        folder = packaged if packaged.is_dir() else Path(__file__).resolve().parents[1] / "specs"
-        return {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.yaml"))}
+    """Name -> text of each example."""
+    return {name.removesuffix(".yaml"): text for name, text in texts("specs").items() if name.endswith(".yaml")}
 
 
 def description(text: str) -> str:

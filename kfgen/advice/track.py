@@ -13,9 +13,8 @@ from kfgen.reference.process import Process
 from kfgen.reference.sensor import Reading, SensorModel
 from kfgen.reference.status import StepError
 from kfgen.simulate import simulate
-from kfgen.spec.advice.usage import expressions
 from kfgen.spec.modes import mode_specs
-from kfgen.spec.tree import Call
+from kfgen.spec.parts import nodes
 from kfgen.spec.types import Dynamics, Spec
 
 Array = NDArray[np.float64]
@@ -79,15 +78,6 @@ def _quick(spec: Spec) -> Spec:
 
 def _size(spec: Spec) -> int:
     """Operations of a step and of all measurements, about."""
-
-    def nodes(part: object) -> int:
-        stack, count = [each.tree for each in expressions(part)], 0
-        while stack:
-            tree = stack.pop()
-            count += 1
-            stack += tree.args if isinstance(tree, Call) else ()
-        return count
-
     dynamics = spec.dynamics
     stages = {"euler": 1, "midpoint": 2}.get(dynamics.integrator, 4) * dynamics.substeps
     return nodes((dynamics, spec.let)) * (stages if dynamics.form == "continuous" else 1) + nodes(spec.measurements)

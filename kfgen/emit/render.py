@@ -4,33 +4,22 @@ from __future__ import annotations
 
 import textwrap
 from functools import cache
-from importlib.resources import as_file, files
-from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
+from jinja2 import DictLoader, Environment, StrictUndefined
 
 from kfgen.emit.data import View
 from kfgen.emit.history import HistoryView
 from kfgen.emit.text import WIDTH
+from kfgen.packaged import texts
 
 _WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
 
 
 @cache
-def _template(name: str) -> str:
-    """A template's text: package data of an installed kfgen, the folder beside the package in a checkout."""
-    packaged = files("kfgen") / "templates" / name
-    with as_file(packaged) as path:
-        if path.is_file():
-            return path.read_text(encoding="utf-8")
-    return (Path(__file__).resolve().parents[2] / "templates" / name).read_text(encoding="utf-8")
-
-
-@cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=FunctionLoader(_template),
+        loader=DictLoader(texts("templates")),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from kfgen.errors import SpecError
-from kfgen.spec.advice.usage import expressions
 from kfgen.spec.modes import mode_specs
-from kfgen.spec.tree import Call
+from kfgen.spec.parts import nodes
 from kfgen.spec.types import Spec
 
 LARGEST = 6000  # operations of a step that are tried in some ten thousand rows, in Python
@@ -19,7 +18,7 @@ def limit_substeps(spec: Spec) -> None:
         if dynamics.form != "continuous" or dynamics.substeps == 1:
             continue
         n = len(each.states)
-        one = STAGES.get(dynamics.integrator, 1) * (_nodes((dynamics.f, each.let)) + n * n)
+        one = STAGES.get(dynamics.integrator, 1) * (nodes((dynamics.f, each.let)) + n * n)
         most = max(1, LARGEST // one)
         if dynamics.substeps > most:
             raise SpecError.at(
@@ -28,12 +27,3 @@ def limit_substeps(spec: Spec) -> None:
                 f"binary point of its own in {spec.scalar}: up to {LARGEST} can be tried",
                 f"use at most {most} substeps, or float",
             )
-
-
-def _nodes(part: object) -> int:
-    stack, count = [each.tree for each in expressions(part)], 0
-    while stack:
-        tree = stack.pop()
-        count += 1
-        stack += tree.args if isinstance(tree, Call) else ()
-    return count

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import as_file, files
 from itertools import groupby
-from pathlib import Path
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
+from jinja2 import DictLoader, Environment, StrictUndefined
 from markupsafe import Markup
 
 from kfgen import __version__
+from kfgen.packaged import texts
 from kfgen.report.blocks import Block, Note, Picture, Section
 from kfgen.report.subject import Subject
 
@@ -79,20 +78,10 @@ def _grouped(blocks: Sequence[Block]) -> list[Group]:
 
 
 @cache
-def _template(name: str) -> str:
-    """A template's text: package data of an installed kfgen, the folder beside the package in a checkout."""
-    packaged = files("kfgen") / "templates" / name
-    with as_file(packaged) as path:
-        if path.is_file():
-            return path.read_text(encoding="utf-8")
-    return (Path(__file__).resolve().parents[2] / "templates" / name).read_text(encoding="utf-8")
-
-
-@cache
 def _environment() -> Environment:
     """Everything is escaped but what is marked as SVG or MathML of kfgen's own making."""
     return Environment(
-        loader=FunctionLoader(_template),
+        loader=DictLoader(texts("templates")),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -112,6 +112,12 @@ class Calls:
         self.enter(opening.offset)
         if self.at("]"):
             raise ExpressionError(opening.offset, "the list is empty", "write a list of numbers: `[0, 0, 1]`")
+        found = self.entries(opening)
+        self.nesting -= 1
+        return self.made(Call("list", tuple(found)), opening.offset)
+
+    def entries(self, opening: Token) -> list[Tree]:
+        """What stands between a bracket that is taken and the one that closes it."""
         found: list[Tree] = []
         while True:
             found.append(self.wanted(False, self.token.offset))
@@ -121,8 +127,7 @@ class Calls:
                 self.unclosed(opening)
             self.take()
         self.take()
-        self.nesting -= 1
-        return self.made(Call("list", tuple(found)), opening.offset)
+        return found
 
     def parts(self, tree: Tree) -> Tree:
         """What follows an operand: `.x`, `[0]`, `[0, 1]`."""
@@ -172,17 +177,9 @@ class Calls:
             self.take()
             if not self.at("["):
                 raise ExpressionError(self.token.offset, "`table` wants a list here", "write `[0, 1, 2]`")
-            opening = self.take()
-            before = len(found)
-            while True:
-                found.append(self.wanted(False, self.token.offset))
-                if self.at("]"):
-                    break
-                if not self.at(","):
-                    self.unclosed(opening)
-                self.take()
-            self.take()
-            lengths.append(len(found) - before)
+            entries = self.entries(self.take())
+            found += entries
+            lengths.append(len(entries))
         if len(lengths) != 2 or not self.at(")"):
             hint = "write `table(x, [x1, x2], [y1, y2])`"
             raise ExpressionError(token.offset, "`table` takes a value and two lists", hint)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
 
@@ -13,6 +13,7 @@ from kfgen.errors import KfgenError, Place
 from kfgen.spec.constants import environment_of, value
 from kfgen.spec.expressions import parse
 from kfgen.spec.lexer import ExpressionError, tokenize
+from kfgen.spec.parts import expressions
 from kfgen.spec.tree import Expression, Tree, names
 from kfgen.spec.types import Constant, Parameter, Range, Spec
 
@@ -45,21 +46,6 @@ class Slot:
     def spots(self) -> list[tuple[Place, int | None]]:
         """Where it is written, and which number of the text it is there."""
         return [(self.place, self.literal), *([] if self.twin is None else [self.twin])]
-
-
-def expressions(part: object) -> Iterator[Expression]:
-    """Every formula of a part of a spec."""
-    if isinstance(part, Expression):
-        yield part
-    elif isinstance(part, Mapping):
-        for each in part.values():
-            yield from expressions(each)
-    elif isinstance(part, tuple):
-        for each in part:
-            yield from expressions(each)
-    elif is_dataclass(part):
-        for entry in fields(part):
-            yield from expressions(getattr(part, entry.name))
 
 
 def plain_path(path: str) -> str:

@@ -10,9 +10,10 @@ from typing import Any
 from kfgen.errors import KfgenError, Place
 from kfgen.spec.expressions import parse
 from kfgen.spec.lexer import tokenize
+from kfgen.spec.parts import expressions
 from kfgen.spec.tree import Call, Expression, Name, Number, Tree, names
 from kfgen.spec.types import Parameter, Spec
-from kfgen.tuning.numbers import START, Slot, expressions, names_at, plain_path
+from kfgen.tuning.numbers import START, Slot, names_at, plain_path
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,9 @@ ALLOWED = {
     "interface": set(),
     "scalar_names": set(),
     "files": {"errors"},
+    "packaged": set(),
     "seal": set(),
-    "examples": {"errors"},
+    "examples": {"errors", "packaged"},
     # the spec, and what reads only it
     "spec": {"errors", "scalar_names"},
     "override": SPEC,
@@ -46,7 +47,7 @@ ALLOWED = {
     "model": SPEC | {"geometry", "ir"},
     "filters": SPEC | {"geometry", "ir", "model", "quantiles", "scalars"},
     "fixed": SPEC | {"emit", "filters", "geometry", "ir", "logs", "model", "scalars"},
-    "emit": {"errors", "filters", "ir", "scalars", "status"},
+    "emit": {"errors", "filters", "ir", "packaged", "scalars", "status"},
     "budgets": SPEC | {"filters", "ir", "scalars"},
     "generate": SPEC | {"budgets", "emit", "filters", "fixed", "ir", "logs", "scalars", "seal"},
     "advice": SPEC | {"generate", "reference", "simulate"},
@@ -58,8 +59,8 @@ ALLOWED = {
     "tuning": SPEC | {"apart", "logs", "native", "reference", "statistics", "status"},
     "plot": SPEC | {"files", "logs", "native"},
     "report": SPEC
-    | {"apart", "cost", "generate", "logs", "model", "native", "plot", "reference", "simulate", "smoothing"}
-    | {"statistics", "status"},
+    | {"apart", "cost", "generate", "logs", "model", "native", "packaged", "plot", "reference", "simulate"}
+    | {"smoothing", "statistics", "status"},
     "check": SPEC
     | {"advice", "excursions", "generate", "geometry", "interface", "native", "override", "reference", "simulate"}
     | {"status"},

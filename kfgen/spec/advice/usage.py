@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
-from typing import Any
 
 from kfgen.errors import Advice, Place
 from kfgen.spec.constants import NotConstant, environment_of, value
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.operations import NoValue
+from kfgen.spec.parts import expressions
 from kfgen.spec.problems import short
 from kfgen.spec.tree import Expression, names
 from kfgen.spec.types import Definition, Group, Spec
@@ -25,21 +24,6 @@ def advice(spec: Spec) -> Iterator[Advice]:
             text = "no process noise acts on any state: the filter becomes sure of them, and deaf"
             cure = "write what may disturb them, `Q: {...}` or `noise`; or keep it awake with `variance_floor`"
             yield Advice(mode.dynamics.place, text, cure, "no_process_noise")
-
-
-def expressions(part: Any) -> Iterator[Expression]:
-    """Every formula in a part of a spec."""
-    if isinstance(part, Expression):
-        yield part
-    elif isinstance(part, Mapping):
-        for each in part.values():
-            yield from expressions(each)
-    elif isinstance(part, tuple):
-        for each in part:
-            yield from expressions(each)
-    elif is_dataclass(part):
-        for field in fields(part):
-            yield from expressions(getattr(part, field.name))
 
 
 def closure(used: Iterable[str], let: tuple[Definition, ...]) -> set[str]:

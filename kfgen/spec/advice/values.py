@@ -9,10 +9,11 @@ from fractions import Fraction
 
 from kfgen.errors import Advice, Place
 from kfgen.scalar_names import DOUBLE
-from kfgen.spec.advice.usage import closure, expressions
+from kfgen.spec.advice.usage import closure
 from kfgen.spec.constants import NotConstant, environment_of, value
 from kfgen.spec.modes import mode_specs
 from kfgen.spec.operations import NoValue, less
+from kfgen.spec.parts import expressions
 from kfgen.spec.problems import short
 from kfgen.spec.raw import key_of
 from kfgen.spec.tree import Call, Expression, Name, Number, Tree, names

@@ -16,6 +16,7 @@ from kfgen.filters.covariance.kernels.function import (
     counter_argument,
     number_argument,
 )
+from kfgen.filters.covariance.kernels.updates import take_in
 from kfgen.ir.program import Function
 from kfgen.ir.trace import Trace
 
@@ -34,20 +35,7 @@ def isolate(kernels: Kernels, n: int) -> Function:
             U[strict_start(j) + own] = 0
         weight = t.variable("left", D[own])
         D[own] = t.field("variance")
-        with t.loop("j", 0, own, down=True) as j:
-            s, d = t.name(w[j], "s"), t.name(D[j], "d")
-            v = t.name(weight.get() * s, "v")
-            a = t.name(d + s * v, "a")
-            some = t.name(a > t.smallest, "some")
-            b = t.name(select(some, v / a, 0), "b")
-            ratio = t.name(select(some, d / a, 1), "ratio")
-            D[j] = a
-            with t.loop("i", 0, j) as i:
-                place = strict_start(j) + i
-                u, w_i = t.name(U[place], "u"), t.name(w[i], "w_i")
-                w[i] = w_i - s * u
-                U[place] = ratio * u + b * w_i
-            weight.set(weight.get() * ratio)
+        take_in(t, (U, D, w), weight, own)
 
     arguments = [array_argument("factor", strict_size(n)), array_argument("diagonal", n), counter_argument("place"),
                  number_argument("variance")]  # fmt: skip

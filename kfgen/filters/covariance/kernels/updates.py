@@ -63,26 +63,32 @@ def absorb(kernels: Kernels, n: int, sure: bool) -> Function:
     return kernels.function("absorb_pair" if sure else "absorb_any_pair", arguments, doc, body)
 
 
+def take_in(t: Trace, factors: tuple[Given, Given, Given | Array], weight: Variable, count: Value | int) -> None:
+    """U D U^T += weight w w^T over the first `count` rows of (U, D, w) (Agee & Turner 1972); uses up weight and w."""
+    U, D, w = factors
+    with t.loop("j", 0, count, down=True) as j:
+        s, d = t.name(w[j], "s"), t.name(D[j], "d")
+        v = t.name(weight.get() * s, "v")
+        a = t.name(d + s * v, "a")
+        some = t.name(a > t.smallest, "some")
+        b = t.name(select(some, v / a, 0), "b")
+        ratio = t.name(select(some, d / a, 1), "ratio")
+        D[j] = a
+        with t.loop("i", 0, j) as i:
+            place = strict_start(j) + i
+            u, w_i = t.name(U[place], "u"), t.name(w[i], "w_i")
+            w[i] = w_i - s * u
+            U[place] = ratio * u + b * w_i
+        weight.set(weight.get() * ratio)
+
+
 def absorb_one(kernels: Kernels, n: int) -> Function:
     """U D U^T += weight w w^T, as `algebra.rank_one`."""
 
     def body(t: Trace) -> None:
         U, D, w = (Given(t, name) for name in ("factor", "diagonal", "w"))
         weight = t.variable("left", t.field("weight"))
-        with t.loop("j", 0, n, down=True) as j:
-            s, d = t.name(w[j], "s"), t.name(D[j], "d")
-            v = t.name(weight.get() * s, "v")
-            a = t.name(d + s * v, "a")
-            some = t.name(a > t.smallest, "some")
-            b = t.name(select(some, v / a, 0), "b")
-            ratio = t.name(select(some, d / a, 1), "ratio")
-            D[j] = a
-            with t.loop("i", 0, j) as i:
-                place = strict_start(j) + i
-                u, w_i = t.name(U[place], "u"), t.name(w[i], "w_i")
-                w[i] = w_i - s * u
-                U[place] = ratio * u + b * w_i
-            weight.set(weight.get() * ratio)
+        take_in(t, (U, D, w), weight, n)
 
     arguments = [array_argument("factor", n * (n - 1) // 2), array_argument("diagonal", n), array_argument("w", n)]
     arguments.append(number_argument("weight"))
