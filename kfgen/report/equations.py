@@ -10,11 +10,22 @@ from typing import Any
 
 import sympy
 from sympy.printing.mathml import MathMLPresentationPrinter
+from sympy.printing.precedence import PRECEDENCE
 
 from kfgen.model.functions import KfFunction
 from kfgen.spec.tree import Call, Expression, Name, Number, Tree
 
 _ENTITIES = {"&InvisibleTimes;": "&#x22C5;", "&ExponentialE;": "e", "&ImaginaryI;": "i"}
+
+
+class Literal(sympy.Symbol):  # type: ignore[misc] # SymPy has no types
+    """A number that is to stand as it is written: x/1.2 is not 0.8333 x."""
+
+    @property
+    def precedence(self) -> float:
+        """3e-5 is a product, in brackets under a power."""
+        between = (PRECEDENCE["Mul"] + PRECEDENCE["Pow"]) / 2
+        return between if "e" in self.name else float(PRECEDENCE["Atom"])
 
 
 class Cases(KfFunction):
@@ -23,6 +34,13 @@ class Cases(KfFunction):
 
 class Named(KfFunction):
     """A function under the name that is its first argument, a symbol."""
+
+
+def _element(dom: Any, tag: str, *children: Any) -> Any:
+    made = dom.createElement(tag)
+    for child in children:
+        made.appendChild(child)
+    return made
 
 
 def _named_call(printer: Any, expression: Any) -> Any:
@@ -43,21 +61,27 @@ def _named_call(printer: Any, expression: Any) -> Any:
     return row
 
 
+def _literal(printer: Any, expression: Any) -> Any:
+    """A number, 3e-5 as 3 x 10^-5."""
+    element, text = partial(_element, printer.dom), printer.dom.createTextNode
+    digits, _, exponent = expression.name.partition("e")
+    if not exponent:
+        return element("mn", text(digits))
+    ten = element("mn", text("10"))
+    power = element("msup", ten, element("mn", text(str(int(exponent)).replace("-", "\N{MINUS SIGN}"))))
+    if digits == "1":
+        return power
+    return element("mrow", element("mn", text(digits)), element("mo", text("·")), power)
+
+
 def _cases(printer: Any, expression: Any) -> Any:
     """Cases as cases, a line each."""
     condition, yes, no = expression.args
-    dom = printer.dom
-
-    def element(tag: str, *children: Any) -> Any:
-        made = dom.createElement(tag)
-        for child in children:
-            made.appendChild(child)
-        return made
-
+    element, text = partial(_element, printer.dom), printer.dom.createTextNode
     lines = [(printer._print(yes), printer._print(condition)), (printer._print(no), element("mtext"))]
-    lines[1][1].appendChild(dom.createTextNode("otherwise"))
+    lines[1][1].appendChild(text("otherwise"))
     rows = [element("mtr", *(element("mtd", cell) for cell in line)) for line in lines]
-    return element("mrow", element("mo", dom.createTextNode("{")), element("mtable", *rows))
+    return element("mrow", element("mo", text("{")), element("mtable", *rows))
 
 
 def mathml(expression: Expression | Tree) -> str:
@@ -68,6 +92,7 @@ def mathml(expression: Expression | Tree) -> str:
 
 def printed(expression: Any) -> str:
     printer = MathMLPresentationPrinter()
+    printer._print_Literal = partial(_literal, printer)
     printer._print_Cases = partial(_cases, printer)
     printer._print_Named = partial(_named_call, printer)
     text: str = printer.doprint(expression)
@@ -102,7 +127,7 @@ def symbolic(tree: Tree) -> Any:
     if isinstance(tree, Number):
         if tree.value.denominator == 1 and abs(tree.value) < 10**6:
             return sympy.Integer(tree.value.numerator)
-        return sympy.Float(repr(float(tree.value)), 15)
+        return Literal(f"{float(tree.value):.15g}", positive=True)
     if isinstance(tree, Name):
         return sympy.pi if tree.name == "pi" else sympy.Symbol(tree.name)
     assert isinstance(tree, Call)
